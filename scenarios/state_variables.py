@@ -163,7 +163,7 @@ def find_variable(registry: Registry, name: str) -> StateVariable:
     try:
         thing = registry.find(name)
         if not isinstance(thing, StateVariable):
-            raise ValueError(f"is a {type(thing).__name__}, not a state variable")
+            raise ValueError(f"is of type {type(thing).__name__}, allowed: state variable")
     except ValueError as error:
         raise ValueError(f"scenario.state_space: {name!r}: {error}") from None
     return replace(thing, trusted=name in registry.built_in)

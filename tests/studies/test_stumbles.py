@@ -91,7 +91,7 @@ def test_a_failure_after_the_last_episode_is_refused(tmp_path, capsys) -> None:
         (lambda: na.BoxPushingSettings(robot=4), "robot = 4: .*; did you mean 'robots'"),
         (lambda: na.BoxPushingSettings(box="hexagn").build(), "did you mean 'hexagon'"),
         (lambda: na.parse_topology(None), "topology None: must be a name, a file or a table"),
-        (lambda: na.build_hierarchy(na.TopologySettings(), "ab"), "has no kind"),
+        (lambda: na.build_hierarchy(na.TopologySettings(), "ab"), "no factory"),
         (lambda: na.parse_topology({"kind": "tems"}), "did you mean 'teams'"),
         (lambda: na.parse_topology({"members": 3}), "topology.members = 3: must be a list"),
     ],

@@ -144,7 +144,7 @@ def test_a_class_with_settings_of_its_own_gets_them(carts: SettingsRegistry) -> 
     [
         ("Foreign", r"^is no cart: it needs a class Settings that inherits \S+\.CartSettings$"),
         ("Bare", r"^is no cart: it needs a class Settings that inherits \S+\.CartSettings$"),
-        ("NUMBER", r"^is no cart, but a int$"),
+        ("NUMBER", r"^is of type int, allowed: cart$"),
     ],
 )
 def test_what_is_no_cart_is_refused(name: str, complaint: str, carts: SettingsRegistry) -> None:
@@ -221,7 +221,7 @@ def test_an_object_without_a_place_is_refused(monkeypatch: pytest.MonkeyPatch) -
     ):
         things.reference_to(typed)
     for nameless in (lambda: None, 3):
-        with pytest.raises(ValueError, match="must be defined at the top level of a file"):
+        with pytest.raises(ValueError, match="is not defined at the top level of a file"):
             things.reference_to(nameless)
 
 

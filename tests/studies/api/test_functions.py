@@ -114,12 +114,12 @@ def test_other_weights_are_another_trial(kept: Path) -> None:
         (
             {**LEARNER, "weights": "own"},
             None,
-            r"learner\.parts\[0\]\.team = .* its learner\.theta has",
+            r"learner\.parts\[0\]\.team = .* learner\.theta has",
         ),
         (
             {"kind": "frozen", "weights": "own"},
             None,
-            r"weights of roles .* fit teams of other sizes",
+            r"'role', teams of other sizes can share weights",
         ),
         (LEARNER, b"PK nothing", r"learner\.parts\[0\]\.team = .*"),
         (LEARNER, b"text", r"trained\.npz: is not a saved team"),
