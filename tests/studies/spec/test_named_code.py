@@ -141,7 +141,7 @@ def test_a_trusted_file_lends_a_study_none_of_its_imports(
     sources = Sources(None, {"mine.py": PYTHON})
     sources.load("mine.py:ring")  # trusted from now on
     for key in ("scenario", "topology", "learner"):
-        with pytest.raises(SpecError, match="is (of type|defined in)"):
+        with pytest.raises(SpecError, match=r"is (of type|defined in)"):
             Spec.of({key: {"kind": f"mine.py:{name}"}}, sources)
     options = {"args": f"touch {tmp_path / 'called'}", "shell": True}
     table = {"kind": "gymnasium", "id": f"mine.py:{name}", "options": options}
