@@ -366,9 +366,7 @@ def test_a_file_of_results_that_names_a_module_is_refused(
 
 def test_an_environment_of_somebody_elses_module_is_refused() -> None:
     table = {"scenario": {"kind": "gymnasium", "id": "payload.worlds:World-v0"}}
-    with pytest.raises(
-        SpecError, match=r"^scenario\.id: payload\.worlds: named by theirs"
-    ):
+    with pytest.raises(SpecError, match=r"^scenario\.id: payload\.worlds: named by theirs"):
         Spec.of(table, Sources(None, brought_by="theirs"))
     Spec.of(
         {"scenario": {"kind": "pettingzoo", "id": "mpe2/simple_spread_v3"}},
