@@ -9,8 +9,8 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.scalability.data import ScalabilityData, paired
 from nested_agents.studies.scalability.fronts import (
     best_within,
-    fronts,
     non_dominated,
+    pareto_points,
     parse_budget,
     probability_of_best,
 )
@@ -48,15 +48,15 @@ def test_a_point_is_beaten_only_if_another_is_no_worse_in_both_and_better_in_one
 
 
 def test_the_front_of_every_size(data):
-    on_front = {(p.size, p.hierarchy) for p in fronts(data) if p.on_front}
+    on_front = {(p.size, p.hierarchy) for p in pareto_points(data) if p.on_front}
     assert on_front == {(2.0, "chain"), (2.0, "tree"), (2.0, "none"), (4.0, "tree"), (4.0, "none")}
-    assert {p.probability for p in fronts(data)} == {0.0, 1.0}
+    assert {p.probability for p in pareto_points(data)} == {0.0, 1.0}
 
 
 def test_seeds_that_differ_make_the_front_uncertain(data):
     values = pd.Series(np.linspace(0.5, 1.1, 8), SEEDS)
     data.performances["chain", 4.0] = values
-    (chain,) = [p for p in fronts(data) if (p.size, p.hierarchy) == (4.0, "chain")]
+    (chain,) = [p for p in pareto_points(data) if (p.size, p.hierarchy) == (4.0, "chain")]
     assert 0.2 < chain.probability < 0.8
 
 
@@ -64,6 +64,19 @@ def test_the_best_hierarchy_within_a_budget(data):
     two, four = best_within(data, {"messages": 5.0})
     assert (two.hierarchy, two.allowed, two.probability) == ("tree", ("tree", "none"), 1.0)
     assert (four.hierarchy, four.allowed) == ("none", ("none",))
+
+
+def test_a_hierarchy_of_unknown_cost_is_not_chosen_and_does_not_hide_the_others(data):
+    del data.costs["messages"]["none", 4.0]
+    four = best_within(data, {"messages": 50.0})[1]
+    assert (four.hierarchy, four.allowed) == ("tree", ("chain", "tree"))
+    assert four.unknown == ("none",)
+
+
+def test_hierarchies_of_equal_performance_share_the_probability_of_being_the_best(data):
+    data.performances["tree", 2.0] = data.performances["chain", 2.0]
+    two = best_within(data, {"messages": 50.0})[0]
+    assert (two.hierarchy, two.probability) == ("chain", 0.5)
 
 
 def test_no_hierarchy_of_a_size_may_be_within_the_budget(data):
@@ -77,8 +90,8 @@ def test_seeds_are_paired_by_name_between_performance_and_cost(data):
     for name in ("chain", "tree", "none"):
         data.performances[name, 4.0] = performance
         data.costs["messages"][name, 4.0] = cost
-    assert {p.performance for p in fronts(data) if p.size == 4.0} == {0.0}
-    assert {p.cost_value for p in fronts(data) if p.size == 4.0} == {9.0}
+    assert {p.performance for p in pareto_points(data) if p.size == 4.0} == {0.0}
+    assert {p.cost_value for p in pareto_points(data) if p.size == 4.0} == {9.0}
 
 
 def test_a_budget_below_everything_says_what_was_measured(data):
@@ -91,10 +104,17 @@ def test_a_cost_that_was_not_measured_is_refused(data):
         best_within(data, {"decision_ms": 5.0})
 
 
-@pytest.mark.parametrize("text", ["messages", "messages < ", "messages >= 5", "messages <= 1e"])
+@pytest.mark.parametrize(
+    "text", ["messages", "messages < ", "messages < 5", "messages >= 5", "messages <= 1e"]
+)
 def test_a_budget_that_cannot_be_read_is_refused(text):
     with pytest.raises(SpecError, match="must be COST <= NUMBER"):
         parse_budget(text)
+
+
+def test_a_cost_has_one_limit():
+    with pytest.raises(SpecError, match="messages stands twice"):
+        parse_budget("messages <= 5, messages <= 9")
 
 
 def test_probabilities_of_being_best_add_up_to_one():
