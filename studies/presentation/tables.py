@@ -252,7 +252,8 @@ class SummaryTable:
     def json(self) -> str:
         """The whole table as JSON with every digit; unknown bounds are null.
 
-        A row has ``condition``, ``seeds``, and ``value``, ``low`` and ``high`` by title.
+        Each row has ``condition``, ``seeds`` and ``estimates``, which maps each title to its
+        ``value``, ``low`` and ``high``.
         """
         rows = []
         for line in self.lines:
