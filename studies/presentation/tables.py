@@ -137,7 +137,7 @@ def in_csv(frame: pd.DataFrame) -> str:
 
 
 def in_parquet(frame: pd.DataFrame) -> bytes:
-    """Return a frame as a Parquet file; columns of mixed types become text.
+    """Return a frame as a Parquet file with checksums; columns of mixed types become text.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def in_parquet(frame: pd.DataFrame) -> bytes:
         if column.dtype == object and column.dropna().map(type).nunique() > 1
     }
     try:
-        return frame.assign(**mixed).to_parquet()
+        return frame.assign(**mixed).to_parquet(engine="pyarrow", write_page_checksum=True)
     except ImportError:
         raise SpecError(
             "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
@@ -225,8 +225,8 @@ class SummaryTable:
     def remark(self) -> str:
         """Remark on the intervals."""
         if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return "Intervals: Wilson's for rates, else bootstrap (too short for skewed values)."
-        return f"Fewer than {FEW} seeds: Wilson's intervals for rates, else Student's intervals."
+            return "Rates have Wilson intervals, others bootstrap intervals (too short if skewed)."
+        return f"Fewer than {FEW} seeds: rates have Wilson intervals, others Student intervals."
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
