@@ -22,6 +22,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..interface.abilities import Embodiment, horizon_of
 from ..interface.prediction import (
     Blocks,
     EmbodiedPrediction,
@@ -29,7 +30,7 @@ from ..interface.prediction import (
     Tables,
     rewards_of,
 )
-from ..interface.scenario import Embodiment, Scenario, Transition, checked_scenario
+from ..interface.scenario import Scenario, Transition, checked_scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 
@@ -48,7 +49,11 @@ def join_agents(scenario: object, agents: Granularity) -> Scenario:
         If `joint_blocks` refuses the granularity; one line.
     """
     checked = checked_scenario(scenario)
-    return checked if agents == "actuator" else JointAgents(checked, agents)
+    if agents == "actuator":
+        return checked
+    if agents == "body" and isinstance(checked, Embodiment):
+        return JointBodies(checked, agents, checked)
+    return JointAgents(checked, agents)
 
 
 def joint_blocks(
@@ -118,7 +123,7 @@ class JointAgents(Scenario):
         self.scenario = scenario
         self.whole = each == "team"
         self.measures = scenario.measures
-        self.horizon = scenario.horizon
+        self.horizon = horizon_of(scenario)
         self._n_each = space.n_variables if self.whole else space.n_own
         of_block = [scenario.agents[i] for i in self.blocks[0]]
         if self.whole:
@@ -158,11 +163,6 @@ class JointAgents(Scenario):
         return replace(transition, states=self._states(transition.states), reward=reward)
 
     @property
-    def predicts(self) -> bool:
-        """Whether the scenario has a prediction."""
-        return self.scenario.predicts
-
-    @property
     def lacks_prediction(self) -> str:
         """Reason why the scenario has no prediction."""
         return self.scenario.lacks_prediction
@@ -171,11 +171,6 @@ class JointAgents(Scenario):
         """Return the prediction from the present state, if there is one."""
         prediction = self.scenario.predict()
         return None if prediction is None else JointPrediction(prediction, self)
-
-    def embodiment(self) -> Embodiment | None:
-        """Return the scenario's bodies, if every agent is a body."""
-        bodies = None if self.whole else self.scenario.embodiment()
-        return None if bodies is None else JointEmbodiment(bodies, self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
         """Return the actions ``(..., n)`` of all agents for the actions of joint agents."""
@@ -209,6 +204,7 @@ class JointPrediction(Prediction, Tables):
     def __init__(self, prediction: Prediction, joint: JointAgents) -> None:
         self._prediction = prediction
         self._joint = joint
+        self.repeats = prediction.repeats
         self._tables = prediction.tables()
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -249,12 +245,12 @@ class JointPrediction(Prediction, Tables):
         return self._tables.reward_table()
 
 
-class JointEmbodiment(Embodiment):
-    """Bodies of a scenario in which every body is one agent."""
+class JointBodies(JointAgents, Embodiment):
+    """A scenario with one agent per body, whose bodies support self-models and calibration."""
 
-    def __init__(self, bodies: Embodiment, joint: JointAgents) -> None:
+    def __init__(self, scenario: Scenario, each: Granularity, bodies: Embodiment) -> None:
+        super().__init__(scenario, each)
         self._bodies = bodies
-        self._joint = joint
         self.nominal_effects = bodies.nominal_effects
         self.constants = bodies.constants
         self.levers = bodies.levers
@@ -263,7 +259,7 @@ class JointEmbodiment(Embodiment):
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> EmbodiedPrediction:
         """Return the prediction for assumed effects and constants."""
-        return JointBodiesPrediction(self._bodies.predict_with(effects, constants), self._joint)
+        return JointBodiesPrediction(self._bodies.predict_with(effects, constants), self)
 
 
 class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..hierarchy.hierarchy import Hierarchy
+from ..interface.abilities import PartiallyObserved
 from ..interface.agents import AgentContext
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
@@ -26,7 +27,7 @@ class Present(NamedTuple):
 
 def is_private(settings: LearnerSettings, scenario: Scenario) -> bool:
     """Return whether every agent has a view of its own, see `views`."""
-    return settings.decision.errors is not None or scenario.is_private
+    return settings.decision.errors is not None or isinstance(scenario, PartiallyObserved)
 
 
 def evaluator_of(

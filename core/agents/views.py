@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
+from ..interface.abilities import Embodiment, PartiallyObserved
 from ..interface.agents import AgentContext
 from ..interface.experience import Observation
 from ..interface.measures import Measure
@@ -116,14 +117,18 @@ class Views:
         self._rows = rows
         self._model = model
         hierarchy = context.hierarchy
+        scenario = context.scenario
+        perceived = len(context.members) * (len(scenario.groups) - 1)
+        if isinstance(scenario, PartiallyObserved):
+            perceived = int(scenario.perceived[context.members].sum())
         # Learners of action values do not predict and need only their own states.
-        perceived = context.scenario.perceived[context.members]
-        self._broadcast = 0.0 if settings.values_actions else float(perceived.sum())
+        self._broadcast = 0.0 if settings.values_actions else float(perceived)
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
-            bodies = context.scenario.embodiment() if settings.decision.errors.constants else None
+            n_constants = 0
+            if settings.decision.errors.constants and isinstance(scenario, Embodiment):
+                n_constants = len(scenario.constants)
             valued = concerned(hierarchy, settings.decision.value_of)
-            n_constants = 0 if bodies is None else len(bodies.constants)
             self._errors = Errors(
                 settings.decision.errors, valued, rows, n_rules, n_constants, context.seed
             )

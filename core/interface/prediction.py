@@ -91,6 +91,10 @@ class Prediction(ABC):
     supported. `nested_agents.scenarios.checking` compares them with `states`.
     """
 
+    repeats: bool = False
+    """Whether agents are assumed to repeat their action in all decisions after the first. If not,
+    they take the neutral action. See `nested_agents.core.interface.abilities.PredictsAhead`."""
+
     @cached_property
     def alike(self) -> IntArray | None:
         """``(G, L)`` first robot-action index with the same result as each index; None if unknown.

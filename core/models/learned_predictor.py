@@ -20,6 +20,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..interface.abilities import horizon_of, partners_of
 from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..values.partitions import Partition
@@ -68,13 +69,13 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         space = self.space
         if not space.shared:
             raise ValueError("learner.predictor: all state variables are an agent's own")
-        self.horizon = settings.horizon or scenario.horizon
+        self.horizon = settings.horizon or horizon_of(scenario)
         if settings.mirrored and not space.n_own:
             raise ValueError("learner.predictor.mirrored: without own variables there is no mirror")
         mirrored = settings.mirrored
         if mirrored is None:
             # The mirror image of an action is unknown, that of an own variable is known.
-            mirrored = space.n_own > 0 and scenario.partners() is not None
+            mirrored = space.n_own > 0 and partners_of(scenario) is not None
         self.mirror = Mirror.of(scenario) if mirrored else None
         self.bodies = DrivenBodies(
             scenario, products=settings.products, memberships=settings.memberships

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..interface.abilities import Embodiment
 from ..interface.experience import Experience, Observation
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
@@ -86,8 +87,8 @@ class TeamModel:
             return self.predictor.predict(seen.present)
         if self.self_model is None and self.calibration is None and errors is None:
             return _checked(seen.scenario.predict())
-        bodies = seen.scenario.embodiment()
-        if bodies is None:
+        bodies = seen.scenario
+        if not isinstance(bodies, Embodiment):
             raise ValueError(
                 "learner.self_model, calibration, decision.errors: the scenario has no bodies"
             )

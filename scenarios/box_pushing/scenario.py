@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...core.interface.abilities import Embodiment
 from ...core.interface.environments import Transitions
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import Embodiment, Scenario, Transition
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, wrap
@@ -209,10 +210,6 @@ class BoxPushing(Scenario, Embodiment):
         if is_noisy or not self.space.is_built_in or step_address() is None:
             return None
         return BoxEnvironments(self, count)
-
-    def embodiment(self) -> Embodiment:
-        """Return itself: self-models can be learned for its robots."""
-        return self
 
     def predict(self) -> BoxPrediction:
         """Predict from the current state; all robots are assumed to be nominal."""

@@ -14,10 +14,11 @@ from time import perf_counter
 
 import numpy as np
 
+from ...core.interface.abilities import Embodiment
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import EmbodiedPrediction, first_alike
-from ...core.interface.scenario import Embodiment, Scenario, Transition
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray
@@ -136,10 +137,6 @@ class KinematicChain(Scenario, Embodiment):
     def environments(self, count: int) -> ChainEnvironments | None:
         """Return many arms that are stepped in one call; None if joints fail."""
         return None if self.settings.failures else ChainEnvironments(self, count)
-
-    def embodiment(self) -> Embodiment:
-        """Return the arm itself, because its joints support self-models."""
-        return self
 
     def predict(self) -> ChainPrediction:
         """Predict from the present state, with failures if the settings say `informed`."""

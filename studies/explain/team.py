@@ -17,9 +17,10 @@ import pandas as pd
 from ...core.agents.fuzzy import FuzzyAgents
 from ...core.agents.loop import world_seed
 from ...core.agents.team import Team
+from ...core.interface.abilities import PolicyMap, ShowsPolicy, horizon_of
 from ...core.interface.experience import Observation
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import PolicyMap, Scenario
+from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
 from ...core.models.learned_predictor import LearnedPredictor
 from ...core.numerics import FloatArray, IntArray
@@ -164,11 +165,12 @@ def _policy(session: Session) -> PolicyMap | str:
     def predict() -> Prediction | None:
         return agents.model.predict(Observation(nowhere, scenario))
 
+    if not isinstance(scenario, ShowsPolicy):
+        return "the scenario has no method show_policy for agents such as these"
     try:
-        policy = scenario.show_policy(choose, predict)
+        return scenario.show_policy(choose, predict)
     except ValueError as error:
         return str(error)
-    return policy or "the scenario has no method show_policy for agents such as these"
 
 
 def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
@@ -211,7 +213,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         for _ in range(DECISIONS):
             joint = team.act(Observation(states, scenario), explore=False).joint_action
             guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}
-            given = scenario.predict() if scenario.horizon == horizon else None
+            given = scenario.predict() if horizon_of(scenario) == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)
             reached = _held(scenario, joint, horizon)

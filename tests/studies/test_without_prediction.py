@@ -87,13 +87,15 @@ class Unpredicted(LineUp):
     """Carts of which nothing is predicted."""
 
     predict = Scenario.predict
-    with_exact_prediction = Scenario.with_exact_prediction
+
+    def with_exact_prediction(self) -> None:
+        """Return None, because nothing is predicted."""
 
 
 def test_joint_agents_predict_what_their_scenario_predicts() -> None:
     mute = Unpredicted(LineUpSettings())
-    assert join_agents(LineUp(LineUpSettings()), "team").predicts
-    assert not join_agents(mute, "team").predicts
+    assert not join_agents(LineUp(LineUpSettings()), "team").lacks_prediction
+    assert "has no method predict" in join_agents(mute, "team").lacks_prediction
     assert join_agents(mute, "team").predict() is None
     findings = check_scenario(lambda: Unpredicted(LineUpSettings()))
     assert set(CHECKS) - set(findings.passed) == {"predictions", "sensed and predicted"}

@@ -99,6 +99,12 @@ class Bare(Scenario):
         return BarePrediction(self.places)
 
 
+class Unmeasured(Bare):
+    """Names what it records, and measures nothing."""
+
+    recorded = ("places",)
+
+
 class BarePrediction(Prediction):
     def __init__(self, places: Any) -> None:
         self.places = places
@@ -690,7 +696,8 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "predicts by global numbers": (line(predict=drawing), "the global state of numpy.random is"),
     "counts resets": (line(reset=counting_resets), "equal seeds: seed . after another episode"),
-    "bounds": (declared(bounds=((-1.0, 1.0), (-0.1, 0.1))), "values: .* leaves"),
+    "bounds": (space(DISTANCE, replace(LEAD, bounds=(-0.1, 0.1)), n_own=1), "values: lead leaves"),
+    "recorded without measure": (Unmeasured, "form: Unmeasured has recorded, and lacks measure"),
     "a group missing": (declared(groups=((0,),)), "form: groups .* must hold the 2 agents once"),
     "rewards of each": (
         predicting(rewards=lambda self, actions: np.zeros((len(actions), 2))),
