@@ -18,14 +18,14 @@ from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
 import nested_agents as na
 from nested_agents.analysis import Estimate, Results, format_number
-from nested_agents.figures import COLOURS
+from nested_agents.figures import COLORS
 from nested_agents.parts import Problem
 from research import RESULTS, load
 from research.experience import TASKS
 from research.studies.games import analyse as analyse_games
 
 FIGURES = Path(__file__).resolve().parent / "figures"
-BLUE, ORANGE, GREEN = COLOURS[:3]
+BLUE, ORANGE, GREEN = COLORS[:3]
 GRAY = "#666666"
 WIDTH = 5.4
 """Width of a figure [inches]: with letters of 10 points it can be read at 390 pixels."""
@@ -145,7 +145,7 @@ def communication_lookahead() -> Figure:
         "communication only": "evaluation:told only",
         "neither": "evaluation:neither",
     }
-    figure = Figure(figsize=(WIDTH + 1.2, 2.5), layout="constrained")
+    figure = Figure(figsize=(WIDTH + 1.2, 2.7), layout="constrained")
     for axes, robots in zip(figure.subplots(1, 3, sharey=True), (2, 4, 8), strict=True):
         for row, phase in enumerate(cases.values()):
             value, low, high = success_of(results, f"value_of=own, robots={robots}", phase)
@@ -157,7 +157,11 @@ def communication_lookahead() -> Figure:
         axes.set_xticks((0.0, 0.5, 1.0))
         axes.set_yticks(range(len(cases)), list(cases))
     axes.invert_yaxis()
-    return titled(figure, "Teams need lookahead; communication adds less")
+    title = (
+        "If agents maximize their own value, teams need lookahead;\n"
+        "communication alone is worse than neither"
+    )
+    return titled(figure, title)
 
 
 def nested_decision() -> Figure:

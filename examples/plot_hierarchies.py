@@ -23,8 +23,8 @@ for ax, name in zip(axes, ("chain", "teams", "tree:2", "star"), strict=True):
     for layer, level in enumerate(nx.topological_generations(graph)):
         nx.set_node_attributes(graph, dict.fromkeys(level, -layer), "layer")
     places = nx.multipartite_layout(graph, "layer", align="horizontal")
-    colours = [f"C{agent // 2}" for agent in graph]
-    nx.draw_networkx(graph, places, ax=ax, node_color=colours, font_color="white")
+    colors = [f"C{agent // 2}" for agent in graph]
+    nx.draw_networkx(graph, places, ax=ax, node_color=colors, font_color="white")
     tried = int(np.sum(4.0 ** (1 + np.array(below_counts(hierarchy)))))
     ax.set_title(f"{name}: {tried:,} joint actions")
     ax.axis("off")

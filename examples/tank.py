@@ -30,7 +30,7 @@ class Tank(na.Scenario):
         # Whatever it did before, a pump now gives 1 l/s, takes 1 l/s or rests.
         self.action_set = na.ActionSet(("in", "out", "rest"), (0, 0, 0), (1, -1, 0), neutral=2)
         flow = na.Variable("flow", "l/s", -1.0, 1.0)
-        missing = na.Variable("missing", "l", -20.0, 20.0, centres=(-20.0, -5.0, 0.0, 5.0, 20.0))
+        missing = na.Variable("missing", "l", -20.0, 20.0, centers=(-20.0, -5.0, 0.0, 5.0, 20.0))
         self.state_space = na.StateSpace("tank", (flow, missing), n_own=1)
 
     def reset(self, seed, episode=0):

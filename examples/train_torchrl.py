@@ -66,7 +66,7 @@ loss.set_keys(
     terminated=("team", "terminated"),
 )
 loss.make_value_estimator(ValueEstimators.GAE, gamma=0.95, lmbda=0.9)
-optimiser = torch.optim.Adam(loss.parameters(), lr=1e-3)
+optimizer = torch.optim.Adam(loss.parameters(), lr=1e-3)
 
 
 def report(when: str) -> None:
@@ -88,8 +88,8 @@ while done < STEPS:
         for rows in torch.randperm(BATCH).split(MINIBATCH):
             losses = loss(batch[rows])
             total = losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"]
-            optimiser.zero_grad()
+            optimizer.zero_grad()
             total.backward()
             torch.nn.utils.clip_grad_norm_(loss.parameters(), 1.0)
-            optimiser.step()
+            optimizer.step()
 report(f"after {done} joint steps")

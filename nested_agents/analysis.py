@@ -12,7 +12,7 @@ from .studies.catalogue.hierarchies import estimates as estimates_of_hierarchy
 from .studies.catalogue.sized import SizedCase
 from .studies.catalogue.study import analyse_as, distinct, system_of
 from .studies.catalogue.wheel_failure import courses_of
-from .studies.results import laws, samples
+from .studies.laws import fitting, samples
 from .studies.results.analysis import (
     EVALUATED,
     Analysis,
@@ -97,6 +97,7 @@ __all__ = [
     "evaluated",
     "evaluated_after",
     "exactly",
+    "fitting",
     "format_estimate",
     "format_number",
     "format_p",
@@ -105,7 +106,6 @@ __all__ = [
     "judged",
     "label",
     "label_but",
-    "laws",
     "paired_difference",
     "paired_permutation",
     "paired_tests",

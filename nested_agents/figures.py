@@ -1,7 +1,7 @@
 """Matplotlib figures in the style of the reports."""
 
 from .studies.presentation.figures import (
-    COLOURS,
+    COLORS,
     STYLES,
     add_legend,
     apply_style,
@@ -28,7 +28,7 @@ from .studies.presentation.figures import (
 )
 
 __all__ = [
-    "COLOURS",
+    "COLORS",
     "STYLES",
     "add_legend",
     "apply_style",

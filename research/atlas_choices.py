@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from nested_agents import rate
-from nested_agents.analysis import LEVEL, format_estimate, format_p, laws, paired_tests
+from nested_agents.analysis import LEVEL, fitting, format_estimate, format_p, paired_tests
 from nested_agents.analysis import samples as samples_of_laws
 
 from .atlas_predictions import largest_small
@@ -86,7 +86,7 @@ def _choice(
     samples = {}
     for hierarchy, own in rows[rows["size"] <= small].groupby("hierarchy", sort=False):
         sample = sample_of(own, measure)
-        if sample is not None and len(sample.sizes) >= laws.FEWEST and len(sample.values) > 1:
+        if sample is not None and len(sample.sizes) >= fitting.FEWEST and len(sample.values) > 1:
             samples[str(hierarchy)] = sample
     if len(samples) < 2:
         return None
@@ -98,7 +98,7 @@ def _choice(
     best = str(at.mean().idxmax())
     others = [hierarchy for hierarchy in samples if hierarchy != best]
     tests = paired_tests([(at[best].to_numpy(), at[other].to_numpy()) for other in others])
-    median = {h: laws.choose(own).distribution(size).quantile(0.5) for h, own in samples.items()}
+    median = {h: fitting.choose(own).distribution(size).quantile(0.5) for h, own in samples.items()}
     predicted = max(median, key=lambda h: median[h])
     rivals = [h for h in samples if h != predicted and not _is_above(samples, predicted, h, size)]
     nearest = means[max(n for n in sizes if n <= small)][list(samples)].mean().idxmax()
@@ -110,7 +110,7 @@ def _is_above(
     samples: Mapping[str, samples_of_laws.Sample], one: str, other: str, size: int
 ) -> bool:
     """Return whether one hierarchy is better than another, by the 90% interval of its lead."""
-    lead = laws.choose(samples_of_laws.apart(samples[one], samples[other]))
+    lead = fitting.choose(samples_of_laws.apart(samples[one], samples[other]))
     return lead.distribution(size).quantile(TAIL) > 0.0
 
 

@@ -80,10 +80,10 @@ def draw_checks(checked: Sequence[Check]) -> Figure:
         ratios = [Estimate(*(e / check.measured for e in check.predicted)) for check in own]
         known = stack_estimates(ratios)
         places = np.arange(len(own))
-        colours = ["C0" if check.is_inside else "C3" for check in own]
+        colors = ["C0" if check.is_inside else "C3" for check in own]
         low, middle, high = np.clip((known.low, known.value, known.high), 1.0 / MOST, MOST)
-        axes.vlines(places, low, high, color=colours, lw=1.2)
-        axes.scatter(places, middle, c=colours, s=12)
+        axes.vlines(places, low, high, color=colors, lw=1.2)
+        axes.scatter(places, middle, c=colors, s=12)
         axes.update_datalim([(0.0, 0.5), (0.0, 2.0)])
         axes.axhline(1.0, color="#888888", lw=0.8, ls=":")
         figures.log_axis(axes)

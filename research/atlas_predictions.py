@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from nested_agents import bootstrap
-from nested_agents.analysis import Estimate, format_estimate, format_number, laws
+from nested_agents.analysis import Estimate, fitting, format_estimate, format_number
 
 from .atlas_rows import COSTS, MEASURES, TeamKind, sample_of
 
@@ -52,9 +52,9 @@ def checks(rows: pd.DataFrame, most: int = SMALL) -> list[Check]:
             continue
         m = int((sample.sizes <= largest_small(str(team[0]), most)).sum())
         first = sample.first(m)
-        if m < laws.FEWEST or m == len(sample.sizes) or np.ptp(first.observed) == 0.0:
+        if m < fitting.FEWEST or m == len(sample.sizes) or np.ptp(first.observed) == 0.0:
             continue
-        law = laws.choose(first)
+        law = fitting.choose(first)
         for k in range(m, len(sample.sizes)):
             size = int(sample.sizes[k])
             measured = float(sample.means[k])
@@ -98,10 +98,10 @@ def exponents(rows: pd.DataFrame, measure: str) -> dict[TeamKind, Estimate]:
     by_team = {}
     for team, own in rows.groupby(list(TeamKind._fields), sort=False):
         sample = sample_of(own, measure)
-        if sample is None or len(sample.sizes) < laws.FEWEST or len(sample.values) < 2:
+        if sample is None or len(sample.sizes) < fitting.FEWEST or len(sample.values) < 2:
             continue
         if np.ptp(sample.observed) == 0.0:
             continue
-        law = laws.fit(sample.scale.curves[0], sample)
+        law = fitting.fit(sample.scale.curves[0], sample)
         by_team[TeamKind(*team)] = law.exponents()["exponent"]
     return by_team

@@ -220,8 +220,8 @@ def judge(results: Mapping[str, Results], paper: str = OWN) -> tuple[Finding, ..
 
 Format = Literal["table", "json", "markdown"]
 
-COLOURS = {"not decided": "yellow"} | dict.fromkeys(("holds", "helps"), "green")
-COLOURS |= dict.fromkeys(("does not hold", "harms"), "red") | {"equal": "blue"}
+COLORS = {"not decided": "yellow"} | dict.fromkeys(("holds", "helps"), "green")
+COLORS |= dict.fromkeys(("does not hold", "harms"), "red") | {"equal": "blue"}
 
 
 def print_claims(findings: Sequence[Finding], form: Format) -> None:
@@ -237,12 +237,12 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
         table.add_column(title, ratio=width)
     for finding in findings:
         claim = finding.claim
-        colour = COLOURS[finding.verdict]
+        color = COLORS[finding.verdict]
         table.add_row(
             claim.text + (f" [dim]({claim.place})[/]" if claim.place else ""),
             f"{claim.measure}: [dim]{claim.criterion.text}[/]",
             finding.result,
-            f"[{colour}]{finding.verdict}[/]",
+            f"[{color}]{finding.verdict}[/]",
         )
     Console().print(table)
     print_text("")

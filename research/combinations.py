@@ -93,7 +93,7 @@ AXES: dict[str, dict[str, SpecTable]] = {
         "teams": _joined("teams"),
         "independent": _joined("independent"),
     },
-    "neighbours": {
+    "neighbors": {
         "simultaneous": _joined("simultaneous"),
         "coordination-graph": _joined("coordination-graph"),
         "oriented": _joined("coordination-graph", decision_order="listed"),

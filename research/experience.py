@@ -71,7 +71,7 @@ TASKS = {
         (1000, 3000, 10_000, 30_000, 100_000),
         50,
         0.5,
-        edges="hierarchy-ppo, neighbours' edges",
+        edges="hierarchy-ppo, neighbors' edges",
     ),
     "landmarks": PublishedCourse("landmarks of five", (1000, 3000, 10_000, 30_000), 100),
     "ring": PublishedCourse(

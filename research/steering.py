@@ -67,7 +67,7 @@ def heading_errors(robots: int, seed: int, episodes: int) -> FloatArray:
 def one_sided(robots: int) -> float:
     """Return the greatest heading error that pushing from one side can make good [deg].
 
-    Robots push obliquely, within the friction cone, and half of them turn the box: per metre by
+    Robots push obliquely, within the friction cone, and half of them turn the box: per meter by
     their lever over the square of its friction radius, of which half counts on the way. Both
     constants are the scripted controller's.
     """

@@ -1,13 +1,13 @@
-"""How much of a sum of values over few neighbours each way to decide reaches, on box pushing.
+"""How much of a sum of values over few neighbors each way to decide reaches, on box pushing.
 
 A team is trained with the preset `default`. In situations that it then meets, every wheel values
-the joint actions of itself and its neighbours on a line of wheels, all others maintaining, by the
+the joint actions of itself and its neighbors on a line of wheels, all others maintaining, by the
 weights that it has learned. The optimum of the sum of these values is found by elimination. What
 others reach of it is told on a scale from the mean over all joint actions, 0, to the optimum, 1:
 
 - best responses, wheel by wheel from all maintaining, until none gains;
 - nested by own values: in a chain each wheel is told what is decided above it, and takes what is
-  best for its own value, with the best of its neighbours below;
+  best for its own value, with the best of its neighbors below;
 - nested by parts: the same for the sum of all values in which its action counts.
 
 Run as ``python -m research.sums``.

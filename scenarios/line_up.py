@@ -40,8 +40,8 @@ INCREMENT = 0.2
 TOLERANCE = 0.08
 """Maximum distance of all carts from the line at success [m]."""
 
-DISTANCE = Variable("distance", "m", -1.0, 1.0, centres=(-1.0, -0.3, 0.0, 0.3, 1.0))
-LEAD = Variable("lead", "m", -0.8, 0.8, centres=(-0.8, -0.2, 0.0, 0.2, 0.8))
+DISTANCE = Variable("distance", "m", -1.0, 1.0, centers=(-1.0, -0.3, 0.0, 0.3, 1.0))
+LEAD = Variable("lead", "m", -0.8, 0.8, centers=(-0.8, -0.2, 0.0, 0.2, 0.8))
 
 
 MEASURES = (

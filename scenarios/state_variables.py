@@ -117,7 +117,7 @@ def state_variable(
     high: float,
     *,
     periodic: bool = False,
-    centres: tuple[float, ...] = (),
+    centers: tuple[float, ...] = (),
     labels: tuple[str, ...] = (),
     common: bool = False,
     mirrored: Literal["same", "opposite"] | None = None,
@@ -126,7 +126,7 @@ def state_variable(
 
     Parameters
     ----------
-    unit, low, high, periodic, centres, labels
+    unit, low, high, periodic, centers, labels
         See `Variable`.
     common
         Whether the variable is the same for all bodies, which makes decisions faster.
@@ -144,7 +144,7 @@ def state_variable(
     """
 
     def describe(function: StateFunction) -> StateVariable:
-        variable = Variable(function.__name__, unit, low, high, periodic, centres, labels, mirrored)
+        variable = Variable(function.__name__, unit, low, high, periodic, centers, labels, mirrored)
         return StateVariable(variable, function, common)
 
     return describe

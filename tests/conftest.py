@@ -22,9 +22,9 @@ from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, labe
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parent)]
 
-# The first example of a test may compile a kernel.
-settings.register_profile("no deadline", deadline=None)
-settings.load_profile("no deadline")
+# The first example of a test may compile a kernel. CI draws the same examples each time.
+settings.register_profile("toolkit", deadline=None, derandomize=bool(os.environ.get("CI")))
+settings.load_profile("toolkit")
 
 
 def decode(codes: np.ndarray, n_agents: int, n_actions: int) -> np.ndarray:
@@ -37,11 +37,11 @@ def permuted() -> Callable[[Hierarchy, Sequence[int]], Hierarchy]:
     """Gives the same hierarchy with agent ``permutation[k]`` listed as k-th."""
 
     def of(hierarchy: Hierarchy, permutation: Sequence[int]) -> Hierarchy:
-        edges, neighbours = (
+        edges, neighbors = (
             [(hierarchy.agents[a], hierarchy.agents[b]) for a, b in pairs]
             for pairs in (hierarchy.edges, hierarchy.neighbors)
         )
-        return Hierarchy([hierarchy.agents[i] for i in permutation], edges, neighbours)
+        return Hierarchy([hierarchy.agents[i] for i in permutation], edges, neighbors)
 
     return of
 

@@ -118,7 +118,7 @@ SEQUENCES: dict[tuple[str, str], tuple[object, ...]] = {
     ("Hierarchy", "agents"): ("a",),
     ("Hierarchy", "edges"): (("a", "b"),),
     ("Hierarchy", "neighbors"): (("a", "b"),),
-    ("state_variable", "centres"): (0.0,),
+    ("state_variable", "centers"): (0.0,),
     ("state_variable", "labels"): ("near",),
 }
 """What sequences may begin with, by function and argument."""

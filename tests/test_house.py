@@ -21,7 +21,7 @@ ALLOWED = {
     "studies": {"studies", "core", "topologies", "scenarios"},
 }
 STUDIES = (
-    "errors", "store", "spec", "trials", "workers", "results", "presentation", "catalogue",
+    "errors", "store", "spec", "trials", "workers", "results", "laws", "presentation", "catalogue",
     "cost", "scalability", "resilience", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""

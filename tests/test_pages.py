@@ -113,7 +113,7 @@ def smaller(arguments: list[str], page: str) -> list[str]:
     changes = [*SMALL]
     if page.endswith("wheel_failures.md"):
         failure = '{kind="reversed",wheels="robot1.front-left",episode=5}'
-        changes = ["seeds=2", "episodes=10", "steps=4", f"scenario.failures=[{failure}]"]
+        changes = ["seeds=2", "episodes=10", "steps=100", f"scenario.failures=[{failure}]"]
     if page.endswith("pettingzoo.md"):
         changes = ["seeds=2", "decisions=4096", "steps=8", "evaluation=1"]
     shown = ["--set"] if "--set" not in arguments else []

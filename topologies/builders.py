@@ -1,10 +1,10 @@
 """The built-in topologies, each a pure function from the names of agents to a networkx graph.
 
-An edge leads from a superior to its subordinate, and every agent is a node; an undirected graph
-joins neighbors. Agents are given in agent order; *bodies* are the agents of one body each, such as
-the wheels of a robot. Keyword-only parameters are the settings of a topology, as they stand in the
-``[topology]`` table of a spec. A graph becomes a `Hierarchy` in `nested_agents.topologies.build`.
-Checks name the culprit: which agent is unknown, missing or named twice.
+Every agent is a node, and an edge leads from a superior to its subordinate. An undirected graph
+joins neighbors instead. Agents are given in agent order; *bodies* groups the same names by body,
+such as the wheels of each robot. Keyword-only parameters are the settings of a topology, which are
+the keys of its ``[topology]`` table in a spec. `nested_agents.topologies.build` turns the graph
+into a `Hierarchy`. Errors name the agent that is unknown, missing or repeated.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from ..core.search.coordination_graphs import Shape
 def check_names(
     names: Sequence[str], agents: Sequence[str], what: str, *, all_needed: bool = True
 ) -> None:
-    """Refuse `names` that are not the agents, each once.
+    """Refuse `names` unless they are the agents, each named once.
 
     Parameters
     ----------
     names
         The names to check.
     agents
-        The agents there are.
+        The agents that exist.
     what
-        The argument that `names` stands in, for the message.
+        The argument that holds the names, for the message.
     all_needed
         Whether every agent must be among the names.
 
@@ -59,12 +59,12 @@ def check_names(
 
 
 def check_legible(names: Iterable[object]) -> None:
-    """Refuse what is no name: neither text nor a whole number, empty, or not to be printed.
+    """Refuse names that are neither printable text nor whole numbers.
 
     Raises
     ------
     ValueError
-        If a name is so; escaped and shortened.
+        If there is such a name; the message shows it escaped and shortened.
     """
     for name in names:
         is_name = isinstance(name, str | int) and not isinstance(name, bool)
@@ -73,7 +73,7 @@ def check_legible(names: Iterable[object]) -> None:
 
 
 def quote(value: object, most: int = 60) -> str:
-    r"""Return a value for a message, in `most` characters at most, none of them special.
+    r"""Return a value for a message: at most `most` characters, with control characters escaped.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def quote(value: object, most: int = 60) -> str:
 
 
 def with_edges(graph: nx.DiGraph, edges: Iterable[Sequence[str]]) -> nx.DiGraph:
-    """Add (superior, subordinate) pairs to a graph, which is modified; refuse one given twice."""
+    """Add (superior, subordinate) pairs to a graph in place; refuse repeated pairs."""
     for superior, subordinate in edges:
         if graph.has_edge(superior, subordinate):
             raise ValueError(f"edge {superior} -> {subordinate} is given more than once")
@@ -94,7 +94,7 @@ def with_edges(graph: nx.DiGraph, edges: Iterable[Sequence[str]]) -> nx.DiGraph:
 
 
 def join_names(names: Iterable[str], most: int = 12) -> str:
-    """Return names for a message, the first `most` of them.
+    """Return the first `most` names for a message.
 
     Examples
     --------
@@ -109,19 +109,20 @@ Names: TypeAlias = Sequence[str]
 Bodies: TypeAlias = Sequence[Names]
 Pairs: TypeAlias = tuple[tuple[str, str], ...]
 Members = TypeAliasType("Members", "tuple[str | Members, ...]")
-"""The members of a group: agents, or groups of members, to any depth."""
+"""Members of a group: agents or further groups, to any depth."""
 Order: TypeAlias = Literal["listed", "reversed", "interleaved"] | tuple[str, ...]
 
 
 def chain(agents: Names, bodies: Bodies = (), *, order: Order = "listed") -> nx.DiGraph:
-    """Put each agent above the next one in `order`: the paper's nested chain.
+    """Arrange the agents in a chain, each above the next, as in the paper.
 
     Parameters
     ----------
     agents, bodies
         Names, also by body.
     order
-        The agents' own order, its reverse, wheel by wheel across robots, or all names in order.
+        Agent order, its reverse, ``interleaved`` (first wheels of all robots, then second wheels),
+        or all names in order.
 
     Examples
     --------
@@ -144,7 +145,7 @@ def chain(agents: Names, bodies: Bodies = (), *, order: Order = "listed") -> nx.
 def tree(
     agents: Names, bodies: Bodies = (), *, branching: Annotated[int, Field(ge=1)] = 2
 ) -> nx.DiGraph:
-    """Put every agent but the last ones above `branching` others.
+    """Arrange the agents in a tree with `branching` subordinates each.
 
     Parameters
     ----------
@@ -169,16 +170,17 @@ def star(
     leader: str | None = None,
     leader_decides: Literal["first", "last"] = "first",
 ) -> nx.DiGraph:
-    """Put one leader right above everyone else, or right below.
+    """Put one leader above all other agents, or below them.
 
     Parameters
     ----------
     agents, bodies
         Names, also by body.
     leader
-        Name of the leader; none: the first agent, or the last one if it decides last.
+        Name of the leader. By default, the first agent, or the last one if it decides last.
     leader_decides
-        Whether the leader decides first and tells everyone else, or last and is told by everyone.
+        Whether the leader decides first and sends its action to all others, or decides last and
+        receives theirs.
 
     Examples
     --------
@@ -204,11 +206,10 @@ def teams(
     link: Literal["chain", "star"] = "chain",
     members: Members | None = None,
 ) -> nx.DiGraph:
-    """Put the leaders of nested groups in a chain or a star, each above its group.
+    """Link leaders of nested groups in a chain or star, each above its group.
 
-    The leader of a group is that of its first member, that of an agent the agent itself. Without
-    `members`, the groups are robots of wheels: the first wheels form a chain, each above its
-    own robot's other wheels.
+    The leader of a group is its first agent. By default, the groups are the robots: their first
+    wheels form a chain, and each is above the other wheels of its robot.
 
     Parameters
     ----------
@@ -217,7 +218,7 @@ def teams(
     link
         Whether the leaders of the members of a group form a chain or a star.
     members
-        Nested lists of agent names, to any depth; none: the bodies (robots) of the scenario.
+        Nested lists of agent names, to any depth. By default, the bodies (robots) of the scenario.
 
     Examples
     --------
@@ -232,7 +233,7 @@ def teams(
 
 
 def independent(agents: Names, bodies: Bodies = ()) -> nx.DiGraph:
-    """Let no agent see another.
+    """Leave all agents unconnected.
 
     Examples
     --------
@@ -243,7 +244,7 @@ def independent(agents: Names, bodies: Bodies = ()) -> nx.DiGraph:
 
 
 def simultaneous(agents: Names, bodies: Bodies = ()) -> nx.Graph:
-    """Let all decide at the same time: each considers what all others might do.
+    """Let all decide at once, each considering the actions of all others.
 
     Examples
     --------
@@ -261,20 +262,19 @@ def coordination_graph(
     edges: Pairs | None = None,
     others: NonNegativeInt | None = None,
 ) -> nx.Graph:
-    """Join neighbors in a shape, or as listed, who decide at once.
+    """Join neighbors, which decide at once, in a shape or by listed pairs.
 
     Parameters
     ----------
     agents, bodies
         Names, also by body.
     shape
-        In agent order; on a ring the last is a neighbor of the first, in a tree everybody of two
-        later ones, in a grid of those in rows and columns. Or those whose actions matter to each
-        other, as the scenario has it.
+        Shape in which the agents are placed in agent order; in a ``tree`` every agent has two later
+        neighbors. With ``scenario`` the scenario says which agents interact.
     edges
-        Pairs of neighbors in place of a shape.
+        Pairs of neighbors, instead of a shape.
     others
-        Seed of as many other pairs, drawn at random, in place of these.
+        Seed with which the same number of other pairs is drawn at random, as a control.
 
     Raises
     ------
@@ -291,7 +291,7 @@ def coordination_graph(
             raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
         graph = nx.relabel_nodes(graphs.build_shape(shape, len(agents)), dict(enumerate(agents)))
     else:
-        Hierarchy(agents, [], edges)  # raises and names what is wrong
+        Hierarchy(agents, [], edges)  # checks the names and pairs
         graph = nx.empty_graph(agents)
         graph.add_edges_from(edges)
     return graph if others is None else graphs.other_edges(graph, others)
@@ -300,7 +300,7 @@ def coordination_graph(
 def from_edges(
     agents: Names, bodies: Bodies = (), *, edges: Pairs, alone: tuple[str, ...] = ()
 ) -> nx.DiGraph:
-    """Take any hierarchy, edge by edge.
+    """Build any hierarchy from its edges.
 
     Parameters
     ----------
@@ -309,7 +309,7 @@ def from_edges(
     edges
         Pairs (superior, subordinate).
     alone
-        Agents that are in no edge.
+        Agents without edges.
 
     Raises
     ------
@@ -330,14 +330,14 @@ def from_edges(
 def random_hierarchy(
     agents: Names, bodies: Bodies = (), *, seed: NonNegativeInt = 0, density: Fraction = 0.3
 ) -> nx.DiGraph:
-    """Rank the agents at random, each above each lower one with a probability.
+    """Rank agents at random, each above a lower one with a probability.
 
     Parameters
     ----------
     agents, bodies
         Names, also by body.
     seed
-        Seed of its random numbers.
+        Seed of the random numbers.
     density
         Probability of each possible edge.
 
@@ -367,22 +367,22 @@ def names_of(members: Iterable[str | Members]) -> list[str]:
 
 
 def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbors: bool = False) -> nx.Graph:
-    """Return a directed acyclic graph over `agents` with its nodes named by their ``str``.
+    """Return a directed acyclic graph over `agents` with the ``str`` of each node as its name.
 
     Parameters
     ----------
     graph
-        Its nodes are the agents, its edges lead from superior to subordinate; not modified.
+        Its nodes are the agents, and its edges lead from superior to subordinate. Not modified.
     agents
         Names in agent order.
     neighbors
-        Whether an undirected graph, which then joins neighbors, is allowed, too.
+        Whether the graph may be undirected; it then joins neighbors.
 
     Raises
     ------
     ValueError
-        If it is undirected, has parallel edges, its nodes are not the agents, or it has a cycle.
-        One line; it names the culprit.
+        If it is undirected or a multigraph, its nodes are not the agents, or it has a cycle. The
+        message is one line and names the node, edge or cycle.
 
     Examples
     --------
@@ -390,18 +390,18 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbors: bool = F
     OutEdgeView([('0', '1')])
     """
     if not graph.is_directed() and not neighbors:
-        raise ValueError("the graph is undirected: who is above whom?")
+        raise ValueError("the graph is undirected, allowed: edges from superior to subordinate")
     if graph.is_multigraph():
         raise ValueError("the graph is a multigraph: edges could be given more than once")
     named: nx.Graph = nx.relabel_nodes(graph, str)
     check_names([str(node) for node in graph], agents, "the graph")
     if named.is_directed() and not nx.is_directed_acyclic_graph(named):
-        Hierarchy(agents, named.edges)  # raises and names the cycle
+        Hierarchy(agents, named.edges)  # the error names the cycle
     return named
 
 
 def _team(members: Sequence[str | Members], arrange: Callable[[Names], nx.DiGraph]) -> nx.DiGraph:
-    """Return the graph of a group whose members' leaders are arranged so."""
+    """Return the graph of a group; `arrange` connects the leaders of its members."""
     if not members:
         raise ValueError("a group has no members")
     graph = nx.compose_all(

@@ -1,13 +1,13 @@
-"""Topologies as they stand in a spec: a ``[topology]`` table, or a string.
+"""Settings of topologies: a ``[topology]`` table of a spec, or a string.
 
-A string is ``"kind"`` or ``"kind:argument"``, see `parse`. A further topology is one function in
-`builders` and one line in `TOPOLOGIES`; its keyword-only parameters are its settings. What may
-follow ``kind:`` is in `strings.ARGUMENTS`.
+A string is ``"kind"`` or ``"kind:argument"``, see `parse`. To add a topology, write one function in
+`builders` and add one line to `TOPOLOGIES`; the function's keyword-only parameters are its
+settings. `strings.ARGUMENTS` defines what may follow ``kind:``.
 
-Users bring hierarchies as files of graphs and groups, in Python files, and in installed packages. A
-user's topology is a function ``(agents, bodies) -> graph``. It is given the names of the agents and
-the same names by body (robot), and returns a networkx DiGraph over all agents, or pairs (superior,
-subordinate); an agent in no pair stands alone.
+Users bring hierarchies as files of graphs or groups, as functions in Python files, and in installed
+packages. A user's topology is a function ``(agents, bodies) -> graph``. It receives the names of
+the agents and the same names by body (robot), and returns a networkx DiGraph over all agents, or
+pairs (superior, subordinate). An agent in no pair has no edges.
 """
 
 from __future__ import annotations
@@ -40,30 +40,30 @@ BUILT = (
     "simultaneous",
     "coordination-graph",
 )
-"""Topologies whose builder is called so."""
+"""Topologies with builders of the same name."""
 
 
 DecisionOrder = Literal["listed", "reversed"] | tuple[str, ...]
-"""Order of decision: agent order, its reverse, or all names in order."""
+"""Decision order: agent order, its reverse, or all names in order."""
 
 
 class TopologySettings(PartSettings):
-    """Settings that all topologies share."""
+    """Settings that all topologies have."""
 
     communication: Communication = "ancestors"
-    """Agents whose decided actions an agent receives: all its ancestors, its parents only, or none.
-    A list restricts the ancestors to those in the agent's own ``body``, in the ``next`` bodies in
-    the order of bodies, or in bodies ``farther`` away."""
+    """Agents that send an agent their actions: all its ancestors, its parents only, or none. A list
+    restricts the ancestors to those in the agent's own ``body``, in the ``next`` bodies in the
+    order of bodies, or in bodies ``farther`` away."""
     lookahead: Lookahead = "descendants"
-    """Agents whose actions an agent searches over beside its own: all its descendants, its children
-    only, or none. A list restricts the descendants by body, as in `communication`."""
+    """Agents over whose actions an agent searches besides its own: all its descendants, its
+    children only, or none. A list restricts the descendants by body, as in `communication`."""
     decision_order: DecisionOrder | None = None
-    """Order of decision of agents that are joined by undirected edges: agent order (``listed``),
-    the reverse, or all names in order. Each edge then leads from the earlier agent to the later
-    one. By default neighbors decide at the same time."""
+    """Decision order of agents that undirected edges join: agent order (``listed``), the reverse,
+    or all names in order. Each edge then leads from the earlier agent to the later one. By default,
+    neighbors decide at the same time."""
     fill_in: bool = False
-    """Whether the superiors of one agent are joined, too, from the last one in the decision order
-    to the first. The best action of an agent then depends on no other agent that has decided."""
+    """Whether the superiors of each agent are joined to each other, too, as in variable
+    elimination. The best action of an agent then depends on no other agent that has decided."""
     failures: tuple[AnyMessageFailure, ...] = ()
     """Failures of messages and absences of agents, with their times."""
 
@@ -91,7 +91,7 @@ class TopologySettings(PartSettings):
 
 
 IMPLIED = {"members": "teams", "edges": "edges"}
-"""Kinds of tables that have none, by a key that they have."""
+"""Kind of a table without the key ``kind``, by a key that it has."""
 
 TOPOLOGIES = SettingsRegistry(
     "topology",
@@ -108,16 +108,16 @@ TOPOLOGIES = SettingsRegistry(
 
 
 def parse(text: str | Mapping[str, object]) -> TopologySettings:
-    """Read a topology from a string, or from a table as it stands in a spec.
+    """Read the settings of a topology from a string or a ``[topology]`` table.
 
-    Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
-    ``file.py:function`` and the name of an installed package's topology stand for themselves. A
-    table without a kind that has `members` is one of groups, one that has `edges` of these.
+    A string is ``"kind"``, ``"kind:argument"``, the path of a file with a graph or a table,
+    ``"file.py:function"``, or the name of a topology of an installed package. A table needs no kind
+    if it has the key `members` (of groups) or `edges`.
 
     Raises
     ------
     ValueError
-        If the kind is unknown or its argument not allowed; one line.
+        If the kind is unknown or its argument is not allowed; one line.
 
     Examples
     --------
@@ -137,6 +137,10 @@ def parse(text: str | Mapping[str, object]) -> TopologySettings:
         if sources.is_file(text):
             return TOPOLOGIES.parsed("file", path=text)
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
+            reference, _, suffix = text.rpartition(":")
+            if ".py:" in reference and suffix:
+                table = f'{{ kind = "{reference}", PARAMETER = VALUE }}'
+                raise ValueError(f"a function has its parameters in a table of the spec: {table}")
             return TOPOLOGIES.parsed(text)
     except SettingsError as error:
         raise ValueError(f"topology {text!r}: {error.problem}") from None
@@ -166,7 +170,7 @@ def _of_table(table: Mapping[str, object]) -> TopologySettings:
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
-"""Any topology's settings: a table distinguished by `kind`, or a string for `parse`."""
+"""Settings of any topology: a table with a `kind`, or a string for `parse`."""
 
 
 def build(
@@ -175,25 +179,25 @@ def build(
     bodies: Sequence[Sequence[int]] | None = None,
     interactions: Sequence[tuple[int, int]] | None = None,
 ) -> Hierarchy:
-    """Build the hierarchy of `settings` over named agents.
+    """Build a hierarchy of named agents.
 
     Parameters
     ----------
     settings
-        Any topology's settings; or a text or a table for `parse`.
+        Settings of a topology, or a string or table for `parse`.
     agents
         Distinct names, in agent order.
     bodies
-        Agent indices, from 0, by body (robot), each once; none: every agent is a body of its own.
+        Agent indices, from 0, by body (robot), each once. By default, every agent is its own body.
     interactions
-        Pairs of agents, by index, whose actions matter to each other: what ``shape = "scenario"``
-        of a coordination graph joins.
+        Pairs of agent indices that interact. A coordination graph with ``shape = "scenario"`` joins
+        them.
 
     Raises
     ------
     ValueError
-        If the settings or the bodies do not fit the agents, or the settings do not make a
-        hierarchy. One line; it names the culprit.
+        If the settings or the bodies do not fit the agents, or the graph is no hierarchy. The
+        message is one line and names the agent or the edge.
 
     Examples
     --------
@@ -273,12 +277,12 @@ def _directed(graph: nx.Graph, settings: TopologySettings, agents: Names) -> nx.
 
 
 def read(path: str) -> nx.DiGraph | TopologySettings:
-    """Return what a file holds: a graph, or another topology.
+    """Return the graph or the topology that a file holds.
 
     Raises
     ------
     ValueError
-        If it holds neither.
+        If the file holds neither.
     """
     content = read_file(path)
     if isinstance(content, nx.Graph):
@@ -291,12 +295,12 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
         raise ValueError(f"{path}: {error}") from None
     for key in ("communication", "lookahead", "decision_order", "fill_in", "failures"):
         if key in settings.model_fields_set:
-            raise ValueError(f"{path}: {key} must stand in the [topology] table of the spec")
+            raise ValueError(f"{path}: {key} belongs in the [topology] table of the spec")
     return settings
 
 
 def _named(agents: Names, bodies: Sequence[Sequence[int]]) -> Bodies:
-    """Return the names of agents given by index, by body; refuse what is no index."""
+    """Return the names of agents by body, from their indices; refuse other values."""
     indices = range(len(agents))
     try:
         named = [[agents[indices.index(i)] for i in body] for body in bodies]
@@ -308,7 +312,7 @@ def _named(agents: Names, bodies: Sequence[Sequence[int]]) -> Bodies:
 
 
 def _pairs(agents: Names, interactions: Sequence[Sequence[int]]) -> tuple[tuple[str, str], ...]:
-    """Return pairs of names for pairs of indices; refuse what is none."""
+    """Return pairs of names for pairs of indices; refuse other values."""
     indices = range(len(agents))
     named = []
     for k, pair in enumerate(interactions):
@@ -322,7 +326,7 @@ def _pairs(agents: Names, interactions: Sequence[Sequence[int]]) -> tuple[tuple[
 
 
 def _arguments(kind: str, text: str) -> Keys:
-    """Return the settings that stand in ``"kind:text"``."""
+    """Return the settings that ``"kind:text"`` gives."""
     if kind not in ARGUMENTS:
         raise ValueError(f"takes no argument, received {text!r}")
     read_as = ARGUMENTS[kind][1]

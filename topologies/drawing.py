@@ -1,17 +1,20 @@
-"""Pictures of hierarchies: superiors left, subordinates right, folded where the chain is long.
+"""Pictures of hierarchies, with superiors on the left and subordinates on the right.
 
-Positions are in inches on the figure, y downwards, so that a name is as large in a picture of 32
-agents as in one of 4.
+Long chains are folded. Positions are in inches on the figure with y pointing down, so that names
+have the same size in all pictures.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
@@ -20,15 +23,32 @@ from ..core.hierarchy.hierarchy import Hierarchy
 from ..core.numerics import FloatArray, nx
 
 COLUMNS = 6
-"""Levels side by side before the picture is folded."""
+"""Levels in a row before the picture is folded."""
 WIDTH = 1.25
-HEIGHT = 0.3
+HEIGHT = 0.32
 """Size of an agent [in]."""
 ACROSS = 1.7
-DOWN = 0.44
+DOWN = 0.46
 """Distance of columns and of rows [in]."""
-COLOURS = ("#cfe2f3", "#fde5cd", "#d9ead3", "#ead1dc", "#fff2cc", "#d0e0e3", "#e6d5c3", "#d9d2e9")
-"""Fill of the agents by body, again from the start when they run out."""
+BODY_COLORS = (
+    "#cfe2f3",
+    "#fde5cd",
+    "#d9ead3",
+    "#ead1dc",
+    "#fff2cc",
+    "#d0e0e3",
+    "#e6d5c3",
+    "#d9d2e9",
+)
+"""Colors of agents by body; further bodies use them again."""
+FONT_SIZE = 8.0
+"""Size of names and notes [pt]."""
+MAX_CHARACTERS = 14
+"""Characters of a name that fit into a line of an agent; a name has two lines at most."""
+CHARACTERS_PER_INCH = 16
+"""Characters of a note that fit into an inch."""
+LUMINANCE = np.array([0.299, 0.587, 0.114])
+"""Weights of red, green and blue (ITU-R BT.601)."""
 
 
 def draw(
@@ -44,26 +64,26 @@ def draw(
     Parameters
     ----------
     hierarchy
-        What to draw.
+        The hierarchy.
     path
-        The file to write.
+        Path of the file.
     bodies
-        Agent indices by robot: one colour each. None: one colour.
+        Agent indices by body; each body has its own color. By default, all agents have the same.
     title
-        Stands above the picture.
+        Title above the picture.
     failing
-        Agents whose messages fail; framed in red.
+        Agents with failing messages, which have a dashed red frame.
 
     Raises
     ------
     ValueError
-        If the suffix is none of these.
+        If the suffix is another one.
     """
     if Path(path).suffix not in (".svg", ".png", ".pdf"):
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
     figure = picture(hierarchy, bodies=bodies, title=title, failing=failing)
     cover_text(figure)
-    # Without date and random identifiers, equal hierarchies give equal files.
+    # Without a date and random identifiers, equal hierarchies give equal files.
     metadata = {"Date": None} if Path(path).suffix == ".svg" else None
     with matplotlib.rc_context({"svg.hashsalt": "nested-agents", "svg.fonttype": "none"}):
         figure.savefig(path, dpi=150, metadata=metadata)
@@ -78,7 +98,7 @@ def picture(
     fills: Sequence[str] = (),
     note: str = "",
 ) -> Figure:
-    """Return a picture of a hierarchy as matplotlib has it; for other arguments see `draw`.
+    """Return the matplotlib figure of a hierarchy; see `draw` for the other parameters.
 
     Parameters
     ----------
@@ -90,44 +110,53 @@ def picture(
     places = positions(hierarchy)
     low = places.min(axis=0)
     high = places.max(axis=0)
-    width, height = high - low + (WIDTH + 0.6, HEIGHT + 1.1)
+    # Edges that change neither ancestors nor descendants.
+    implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
+    head = 0.65 if title else 0.25
+    width, height = high - low + (WIDTH + 0.6, HEIGHT + head + 0.35)
     width = max(width, 4.5, 0.09 * len(title))
-    centre = (low[0] + high[0]) / 2
+    notes = [*_notes(hierarchy, bodies), *[note] * bool(note)]
+    notes += ["gray arrows: implied by the others"] * bool(implied)
+    notes += ["dashed frame: messages fail"] * bool(failing)
+    legend = wrap("; ".join(notes), int(CHARACTERS_PER_INCH * width))
+    height += 0.15 * len(legend)
+    center = (low[0] + high[0]) / 2
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    axes.set_xlim(centre - width / 2, centre + width / 2)
-    top = low[1] - HEIGHT / 2 - 0.65
+    axes.set_xlim(center - width / 2, center + width / 2)
+    top = low[1] - HEIGHT / 2 - head
     axes.set_ylim(top + height, top)
-    # Edges without which everyone would see the same agents.
-    implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
     _arrows(axes, hierarchy, places, implied)
     body_of = {i: number for number, members in enumerate(bodies or []) for i in members}
-    body_fills = [COLOURS[body_of.get(i, 0) % len(COLOURS)] for i in range(len(hierarchy))]
+    body_fills = [BODY_COLORS[body_of.get(i, 0) % len(BODY_COLORS)] for i in range(len(hierarchy))]
     _agents(axes, hierarchy, places, fills or body_fills, failing)
-    notes = ["numbers: order of decision"]
-    if hierarchy.neighbors:
-        notes = ["lines: neighbours, who decide at the same time"]
-    elif bodies and max(map(len, bodies)) > 1:
-        notes.append("colours: bodies")
-    notes += [note] * bool(note)
-    notes += ["grey arrows: implied by the others"] * bool(implied)
-    styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
-    notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
-    axes.text(centre, top + 0.27, title, fontsize=10, ha="center", va="center")
-    bottom = top + height - 0.17
+    axes.text(center, top + 0.27, title, fontsize=10, ha="center", va="center", parse_math=False)
     axes.text(
-        centre, bottom, "; ".join(notes), fontsize=7.5, color="#555555", ha="center", va="center"
-    )
+        center, top + height - 0.1, "\n".join(legend),
+        fontsize=FONT_SIZE, color="#444444", ha="center", va="bottom",
+    )  # fmt: skip
     return figure
 
 
-def positions(hierarchy: Hierarchy) -> FloatArray:
-    """Return where the agents are drawn, ``(n, 2)`` [in].
+def _notes(hierarchy: Hierarchy, bodies: Sequence[Sequence[int]] | None) -> list[str]:
+    """Return the meaning of numbers, lines, colors and styles of arrows."""
+    notes = ["numbers: decision order"]
+    if hierarchy.neighbors:
+        notes = ["lines: neighbors, which decide at the same time"]
+    elif bodies and max(map(len, bodies)) > 1:
+        notes.append("colors: bodies")
+    styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
+    return [*notes, *sorted(styles)]
 
-    A level holds the agents that are equally many steps, on the longest way, from the top. Levels
-    are columns, each agent beside its superiors; every `COLUMNS` of them the picture folds and runs
-    back below. Neighbours are on a circle, where all lines between them can be seen.
+
+def positions(hierarchy: Hierarchy) -> FloatArray:
+    """Return the positions of the agents, ``(n, 2)`` [in].
+
+    The agents of a level have longest paths of the same length from the top. Each level is a column
+    in which agents are ordered by the positions of their superiors. After `COLUMNS` levels the
+    picture folds and continues below in the opposite direction. Neighbors stand on a circle, so
+    that all lines between them are visible.
     """
     n = len(hierarchy)
     if hierarchy.neighbors:
@@ -139,8 +168,8 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
     places = np.zeros((n, 2))
     bands = np.zeros(n, dtype=int)
     for number, level in enumerate(nx.topological_generations(graph)):
-        beside = {i: np.mean(places[list(graph.pred[i]), 1]) if number else 0.0 for i in level}
-        ranked = sorted(level, key=lambda i: (beside[i], -len(hierarchy.searched(i)), i))
+        heights = {i: np.mean(places[list(graph.pred[i]), 1]) if number else 0.0 for i in level}
+        ranked = sorted(level, key=lambda i: (heights[i], -len(hierarchy.searched(i)), i))
         band, column = divmod(number, COLUMNS)
         bands[ranked] = band
         places[ranked, 0] = ACROSS * (COLUMNS - 1 - column if band % 2 else column)
@@ -157,7 +186,7 @@ def _arrows(
     for a, b in hierarchy.neighbors:
         axes.plot(*places[[a, b]].T, color="#444444", linewidth=0.8, zorder=1)
     for edge in hierarchy.edges:
-        colour, thickness, order = ("#c4c4c4", 0.6, 1) if edge in implied else ("#444444", 1.0, 2)
+        color, thickness, order = ("#c4c4c4", 0.6, 1) if edge in implied else ("#444444", 1.0, 2)
         start, end, bend = _route(*places[list(edge)])
         arrow = FancyArrowPatch(
             tuple(start),
@@ -169,32 +198,32 @@ def _arrows(
             shrinkB=0,
             linewidth=thickness,
             linestyle=_style(hierarchy, edge)[0],
-            color=colour,
+            color=color,
             zorder=order,
         )
         axes.add_patch(arrow)
 
 
 def _style(hierarchy: Hierarchy, edge: tuple[int, int]) -> tuple[str, str]:
-    """Return the line of an edge of which one relation alone holds, and what it means."""
+    """Return the line style of an edge and its entry in the legend, by the relations along it."""
     a, b = edge
     return {
         (True, True): ("-", ""),
         (False, True): ("--", "dashed arrows: lookahead only"),
         (True, False): (":", "dotted arrows: communication only"),
-        (False, False): ("", "heads alone: neither communication nor lookahead"),
+        (False, False): ("", "arrowheads only: neither communication nor lookahead"),
     }[a in hierarchy.senders(b), b in hierarchy.searched(a)]
 
 
 def _route(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return start, end and bend of the arrow between agents centred at a and b."""
+    """Return start, end and bend of the arrow between agents with centers a and b."""
     across, down = b - a
-    if abs(across) < ACROSS / 2:  # where the picture folds: around the outside
+    if abs(across) < ACROSS / 2:  # at a fold of the picture, around the outside
         side = 1.0 if a[0] > ACROSS * (COLUMNS - 1) / 2 else -1.0
         edge = np.array([side * WIDTH / 2, 0.0])
         return a + edge, b + edge, -side * 0.4 / down
     edge = np.array([np.sign(across) * WIDTH / 2, 0.0])
-    # Past a column in between, a straight arrow would run through its agents.
+    # A straight arrow across a column would run through its agents.
     return a + edge, b - edge, 0.12 if abs(across) > 1.5 * ACROSS else 0.0
 
 
@@ -207,7 +236,6 @@ def _agents(
 ) -> None:
     for rank, i in enumerate(hierarchy.order, 1):
         x, y = places[i]
-        name = hierarchy.agents[i]
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
         box = FancyBboxPatch(
             corner,
@@ -221,7 +249,22 @@ def _agents(
             zorder=3,
         )
         axes.add_patch(box)
-        size = min(8.5, 8.5 * 15 / len(name))
-        left = x - WIDTH / 2 + 0.07
-        axes.text(left, y, str(rank), fontsize=6.5, va="center", color="#777777", zorder=4)
-        axes.text(x + 0.06, y, name, fontsize=size, ha="center", va="center", zorder=4)
+        ink = "black" if np.array(to_rgb(fills[i])) @ LUMINANCE > 0.5 else "white"
+        style: dict[str, Any] = {"fontsize": FONT_SIZE, "va": "center", "color": ink, "zorder": 4}
+        axes.text(x - WIDTH / 2 + 0.07, y, str(rank), **style)
+        name = axes.text(x + 0.08, y, _in_two_lines(hierarchy.agents[i]), ha="center", **style)
+        name.set(linespacing=1.0, parse_math=False)
+
+
+def _in_two_lines(name: str) -> str:
+    r"""Return a name in at most two lines, without its middle if it is too long.
+
+    >>> _in_two_lines("robot1.left"), _in_two_lines("north.junction12")
+    ('robot1.left', 'north.ju\nnction12')
+    """
+    if len(name) <= MAX_CHARACTERS:
+        return name
+    if len(name) <= 2 * MAX_CHARACTERS:
+        half = -(-len(name) // 2)
+        return f"{name[:half]}\n{name[half:]}"
+    return f"{name[: MAX_CHARACTERS - 1]}…\n{name[-MAX_CHARACTERS:]}"

@@ -1,4 +1,4 @@
-"""Files that hold a hierarchy: GraphML, JSON and TOML."""
+"""Hierarchies in GraphML, JSON and TOML files."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from . import graphml
 from .builders import check_legible, quote
 
 NUMBERED = re.compile(r"n?\d+")
-"""Ids that a program gave to nodes, as yEd and Gephi do."""
+"""Node ids that programs such as yEd and Gephi generate."""
 NODE_LINK_KEYS = ("directed", "multigraph", "graph", "nodes", "edges", "links")
 """Keys that `networkx.node_link_data` writes; ``links`` is the older name of ``edges``."""
 
 
 class Node(NamedTuple):
-    """A node as a file lists it."""
+    """A node of a file."""
 
     id: object
     label: object = None
@@ -32,11 +32,11 @@ class Node(NamedTuple):
 def read_file(path: str) -> nx.Graph | dict[str, object]:
     """Read a graph or a ``[topology]`` table from GraphML, JSON or TOML, selected by suffix.
 
-    JSON and TOML hold a table, alone or under the key ``topology``: of edges, ``{"edges": [["a",
-    "b"], ...], "alone": [...]}``, of nested groups, ``{"members": [...]}``, or with the key
-    ``kind``. A table with the key ``nodes`` is a graph as `networkx.node_link_data` writes it. The
-    id of a node is the name of its agent. If all ids are numbers, with or without an ``n`` before
-    them, and nodes have labels, the label is the name.
+    JSON and TOML files hold a table, alone or under the key ``topology``: with edges, ``{"edges":
+    [["a", "b"], ...], "alone": [...]}``, with nested groups, ``{"members": [...]}``, or with the
+    key ``kind``. A table with the key ``nodes`` is a graph in the format of
+    `networkx.node_link_data`. The id of a node is the name of its agent. If all ids are numbers,
+    such as ``3`` or ``n3``, and nodes have labels, the label is the name.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
     Raises
     ------
     ValueError
-        If the file cannot be read, holds neither, or contradicts itself; one line.
+        If the file cannot be read, holds neither, or is inconsistent; one line.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in sources.GRAPHS:
@@ -67,7 +67,7 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
 
 
 def _json(text: str) -> object:
-    """Return the content of a JSON file; refuse an object that has one key twice."""
+    """Return the content of a JSON file; refuse objects with repeated keys."""
 
     def table(pairs: list[tuple[str, object]]) -> dict[str, object]:
         for key, times in Counter(key for key, _ in pairs).items():
@@ -79,7 +79,7 @@ def _json(text: str) -> object:
 
 
 def _node_link_graph(content: dict[str, object]) -> nx.Graph:
-    """Return the graph of a table as `networkx.node_link_data` writes it."""
+    """Return the graph of a table in the format of `networkx.node_link_data`."""
     for key in content:
         if key not in NODE_LINK_KEYS:
             raise ValueError(f"unknown key {quote(key)}: {closest(key, NODE_LINK_KEYS)}")
@@ -105,7 +105,7 @@ def _node_link_graph(content: dict[str, object]) -> nx.Graph:
 
 
 def _flag(content: dict[str, object], key: str) -> bool:
-    """Return a flag of a table, false if it is absent."""
+    """Return a flag of a table; False if it is absent."""
     value = content.get(key, False)
     if not isinstance(value, bool):
         raise ValueError(f"{key} = {quote(value)}: must be true or false, without quotes")
@@ -127,7 +127,7 @@ def _tables(
 def _graph(
     nodes: list[Node], edges: Iterable[tuple[object, object]], is_directed: bool
 ) -> nx.Graph:
-    """Return the graph of nodes and edges; refuse what is given twice or does not exist."""
+    """Return the graph of nodes and edges; refuse repeated nodes and edges and unknown ids."""
     check_legible(node.id for node in nodes)
     ids = [str(node.id) for node in nodes]
     _refuse_repeated(ids, "id")
@@ -150,13 +150,13 @@ def _graph(
 
 
 def _names_of(nodes: list[Node]) -> list[str]:
-    """Return the names of agents: ids, or labels if all ids are numbers and nodes have labels."""
+    """Return the names of agents: labels if all ids are numbers and nodes have labels, else ids."""
     labeled = [node for node in nodes if node.label is not None]
     if not labeled or not all(NUMBERED.fullmatch(str(node.id)) for node in nodes):
         return [str(node.id) for node in nodes]
     for node in nodes:
         if node.label is None:
-            raise ValueError(f"node {quote(node.id)} has no label, others have one")
+            raise ValueError(f"node {quote(node.id)} has no label, but other nodes have one")
     labels = [n.label.strip() if isinstance(n.label, str) else n.label for n in nodes]
     check_legible(labels)
     names = [str(label) for label in labels]
@@ -167,7 +167,7 @@ def _names_of(nodes: list[Node]) -> list[str]:
 def _refuse_repeated(names: list[str], what: str) -> None:
     for name, times in Counter(names).items():
         if times > 1:
-            raise ValueError(f"{what} {quote(name)} is that of {times} nodes, allowed: one")
+            raise ValueError(f"{what} {quote(name)} belongs to {times} nodes, allowed: one")
 
 
 def _table_of(content: object) -> dict[str, object]:
@@ -175,7 +175,7 @@ def _table_of(content: object) -> dict[str, object]:
     if isinstance(content, dict) and "topology" in content:
         others = [key for key in content if key != "topology"]
         if others:
-            raise ValueError(f"key {quote(others[0])} beside topology, allowed: topology alone")
+            raise ValueError(f"unknown key {quote(others[0])}, allowed: topology alone")
         content = content["topology"]
     if not isinstance(content, dict) or not {"kind", "members", "edges"} & content.keys():
         raise ValueError("it must be a table with one of the keys edges, members and kind")

@@ -1,7 +1,7 @@
 """Parser of GraphML, including the labels that yEd and Gephi write.
 
-GraphML is read directly because `networkx.read_graphml` ignores further graphs of a file, edges
-whose ``directed`` is written 0 or 1, repeated nodes, and nodes that only an edge names.
+`networkx.read_graphml` would ignore further graphs of a file, the values 0 and 1 of the attribute
+``directed`` of edges, repeated nodes, and unknown nodes of edges.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def parse(text: str) -> tuple[list[tuple[str, str | None]], list[Edge], bool]:
     Raises
     ------
     ValueError
-        If the text is no XML, holds no graph or several, or contradicts itself; one line.
+        If the text is no XML, does not hold exactly one graph, or is inconsistent; one line.
     """
     try:
         root = ElementTree.fromstring(text)
@@ -70,7 +70,7 @@ def _attribute(element: Element, name: str) -> str:
 
 
 def _edge(element: Element, default: str) -> Edge:
-    """Return the ids of the nodes that an edge joins; refuse another direction than `default`."""
+    """Return the ids of the two nodes of an edge; refuse another direction than `default`."""
     ends = _attribute(element, "source"), _attribute(element, "target")
     edge = f"edge {quote(ends[0])} - {quote(ends[1])}"
     for name in element.keys():  # noqa: SIM118 an element iterates over its children
@@ -90,7 +90,7 @@ def _edge(element: Element, default: str) -> Edge:
 
 
 def _label(node: Element, namespace: str, label_keys: set[str | None]) -> str | None:
-    """Return the label of a node, as Gephi or yEd writes it; none: it has no label."""
+    """Return the label of a node, as Gephi or yEd writes it; None if it has no label."""
     for data in node.iter(f"{namespace}data"):
         if data.get("key") in label_keys:
             return data.text or ""

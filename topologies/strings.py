@@ -1,4 +1,4 @@
-"""Arguments after the colon of a topology that is written as a string, as ``"tree:3"``."""
+"""Arguments of topologies that are written as strings, such as ``"tree:3"``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Keys: TypeAlias = dict[str, object]
 
 
 def _order(text: str) -> Keys:
-    """Read a word, or all names separated by commas."""
+    """Read an order by name, or all names separated by commas."""
     if text in ("listed", "reversed", "interleaved"):
         return {"order": text}
     names = tuple(name.strip() for name in text.split(","))
@@ -21,7 +21,7 @@ def _order(text: str) -> Keys:
     return {"order": names}
 
 
-def _neighbours(text: str) -> Keys:
+def _neighbors(text: str) -> Keys:
     """Read a shape, or pairs of names as ``a-b,b-c``."""
     if text in ("scenario", *get_args(Shape)):
         return {"shape": text}
@@ -35,7 +35,7 @@ def _neighbours(text: str) -> Keys:
 
 
 def _edges(text: str) -> Keys:
-    """Read ``"a>b,b>c,d"``: edges, and agents that stand alone."""
+    """Read edges and single agents from a text such as ``"a>b,b>c,d"``."""
     parts = _split(text, ">")
     for part in parts:
         if len(part) > 2 or not all(part):
@@ -53,9 +53,9 @@ ARGUMENTS: dict[str, tuple[str, str | Callable[[str], Keys]]] = {
     "tree": ("BRANCHING", "branching"),
     "star": ("LEADER", "leader"),
     "teams": ("star", "link"),
-    "coordination-graph": ("line|ring|tree|grid|scenario|A-B,B-C,...", _neighbours),
+    "coordination-graph": ("line|ring|tree|grid|scenario|A-B,B-C,...", _neighbors),
     "edges": ("A>B,B>C,D", _edges),
     "random": ("SEED", "seed"),
     "file": ("PATH.graphml|PATH.json|PATH.toml", "path"),
 }
-"""By kind what may follow ``kind:``, in words, and the setting that it is or how it is read."""
+"""For each kind, a description of its argument, and the setting it gives or its parser."""

@@ -1,4 +1,4 @@
-"""Calls a user's function that makes a hierarchy, and names what is wrong with what it returns."""
+"""Calls of users' functions that build hierarchies, with checks of what they return."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from ..core.plugins import registry, settings, sources
 from .builders import Bodies, Names, independent, with_edges
 
 Build: TypeAlias = Callable[[Names, Bodies], object]
-"""Makes a graph, or pairs, of names of agents and these by body."""
+"""Function from names of agents, and these by body, to a graph or to pairs of names."""
 
 
 def call_builder(build: Build, name: str, agents: Names, bodies: Bodies) -> nx.Graph:
-    """Return the graph that a user's function of this name makes.
+    """Return the graph that a user's function builds.
 
     Raises
     ------
     ValueError
-        If it raises, returns neither a graph nor pairs, or not the same ones twice.
+        If the function raises, returns neither a graph nor pairs, or returns something else when it
+        is called again.
     """
     graph, again = (_called(build, name, agents, bodies) for _ in range(2))
     if set(graph.edges) != set(again.edges):
@@ -38,7 +39,7 @@ def _called(build: Build, name: str, agents: Names, bodies: Bodies) -> nx.Graph:
     try:
         result = build(tuple(agents), tuple(tuple(body) for body in bodies))
         if isinstance(result, nx.Graph):
-            list(map(str, result))  # an object of the user's may refuse to
+            list(map(str, result))  # a user's nodes may have no text
             return result
         edges = _pairs(result, most)
     except KeyboardInterrupt:
@@ -46,7 +47,7 @@ def _called(build: Build, name: str, agents: Names, bodies: Bodies) -> nx.Graph:
     except BaseException as error:
         ours = {__file__, registry.__file__, settings.__file__}
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename not in ours]
-        # Of the user's file, whatever library it has called.
+        # Lines of the user's file, not of the libraries that it calls.
         lines = [f.lineno for f in frames if f.filename == frames[0].filename]
         where = f" in line {lines[-1]}" if lines else ""
         raise ValueError(
@@ -55,7 +56,7 @@ def _called(build: Build, name: str, agents: Names, bodies: Bodies) -> nx.Graph:
     if edges is None:
         raise ValueError(
             f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph, a Graph "
-            "of neighbours, or a list of nothing but pairs (superior, subordinate)"
+            "of neighbors, or a list of pairs (superior, subordinate)"
         )
     if len(edges) > most:
         raise ValueError(f"{name} gave more than {most} pairs of {len(agents)} agents")
@@ -63,10 +64,10 @@ def _called(build: Build, name: str, agents: Names, bodies: Bodies) -> nx.Graph:
 
 
 def _pairs(result: object, most: int) -> list[tuple[str, str]] | None:
-    """Return pairs of names, one more than `most` at most; None if it holds something else."""
+    """Return at most ``most + 1`` pairs of names; None if the result holds something else."""
     if not isinstance(result, Iterable):
         if iscoroutine(result):
-            result.close()  # or Python says that nobody has awaited it
+            result.close()  # avoids a warning that it was never awaited
         return None
     pairs = list(islice(result, most + 1))
     if not all(isinstance(pair, Collection) and len(pair) == 2 for pair in pairs):

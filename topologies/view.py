@@ -1,4 +1,4 @@
-"""A hierarchy as the user sees it: in a table, as JSON, as a picture."""
+"""Hierarchies as tables and as JSON, for the command line."""
 
 import json
 import shutil
@@ -21,46 +21,45 @@ from .strings import ARGUMENTS
 
 Form = Literal["table", "json"]
 
-
 MOST_AGENTS = 1000
-"""Beyond, the table has more lines than anybody reads, and takes minutes."""
+"""Maximum number of agents in a table."""
 
 
 @dataclass(frozen=True)
 class HierarchyView:
-    """A topology over agents."""
+    """The hierarchy that a topology makes of given agents."""
 
     text: str
     """The topology as the user wrote it."""
     hierarchy: Hierarchy
-    """The hierarchy that the topology makes."""
+    """The hierarchy."""
     bodies: tuple[tuple[int, ...], ...]
-    """Agents by body."""
+    """Agent indices by body."""
     actions: int
-    """Actions of an agent."""
+    """Number of actions of an agent."""
     failures: tuple[MessageFailure, ...] = ()
     """Failures of messages."""
 
     @property
     def tries(self) -> tuple[int, ...]:
-        """Joint actions that each agent tries per step in agent order, if it tries all."""
+        """Joint actions per step that each agent tries in an exhaustive search, in agent order."""
         return tuple(self.actions ** (1 + count) for count in below_counts(self.hierarchy))
 
     @property
     def failing(self) -> tuple[int, ...]:
-        """The agents whose messages fail at some time."""
+        """Agents with messages that fail at some time."""
         masks = [f.mask(self.hierarchy.agents, "topology.failures") for f in self.failures]
         return tuple(i for i in range(len(self.hierarchy)) if any(mask[i] for mask in masks))
 
     @property
     def remarks(self) -> list[str]:
-        """Communication and lookahead unless they are the defaults, and failures, a line each."""
+        """One line on communication and lookahead unless they are the defaults; one per failure."""
         both = self.hierarchy.communication, self.hierarchy.lookahead
         communication, lookahead = (r if isinstance(r, str) else " and ".join(r) for r in both)
-        passed = f"{self.hierarchy.n_messages:,} messages a step"
-        lines = [f"communication: {communication}; lookahead: {lookahead}; {passed}"]
-        parted = both != ("ancestors", "descendants")
-        return lines * parted + [f"fails: {failure.text}" for failure in self.failures]
+        messages = f"{self.hierarchy.n_messages:,} messages a step"
+        relations = f"communication: {communication}; lookahead: {lookahead}; {messages}"
+        is_changed = both != ("ancestors", "descendants")
+        return [relations] * is_changed + [f"fails: {failure.text}" for failure in self.failures]
 
     @property
     def title(self) -> str:
@@ -75,9 +74,9 @@ class HierarchyView:
 def view(
     text: str, agents: int | None, robots: int | None, actions: int, per: Granularity = "actuator"
 ) -> HierarchyView:
-    """Build the topology written as `text`, over as many agents as asked for.
+    """Build the topology that `text` describes, for a number of agents or robots.
 
-    With `per` it is built over those who act for the agents of a body each, or for all.
+    `per` is the granularity: one agent per actuator, per body, or for the team.
 
     Raises
     ------
@@ -95,13 +94,13 @@ def view(
 
 
 def names_in(settings: TopologySettings) -> tuple[str, ...]:
-    """Return the agents that the settings themselves name, in order; none for most kinds."""
+    """Return the agents that the settings name, in order; empty for most kinds."""
     if settings.kind == "file":
         content = read(settings.title)
         if isinstance(content, TopologySettings):
             return names_in(content)
         names = [str(node) for node in content]
-    else:  # lists in settings are lists of names, but for those that all topologies have
+    else:  # lists are lists of names, except in the settings that all topologies have
         shared = set(TopologySettings.model_fields)
         table = settings.model_dump(exclude=shared) if settings.kind in TOPOLOGIES.built_in else {}
         names = names_of(value for value in table.values() if isinstance(value, tuple))
@@ -112,11 +111,11 @@ def names_in(settings: TopologySettings) -> tuple[str, ...]:
 def team_of(
     agents: int | None = None, robots: int | None = None, named: Sequence[str] = ()
 ) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
-    """Return names of agents, and these by body, for the numbers asked for.
+    """Return the names of a number of agents or robots, and agent indices by body.
 
-    A robot has two wheels unless the numbers say otherwise. Agents are named ``robot1.left``,
-    ``robot1.right`` for two wheels, ``robot1.wheel1`` for more, ``agent1`` for one; but as in
-    `named` if the topology names others.
+    A robot has two wheels unless the numbers say otherwise. Its agents are called ``robot1.left``
+    and ``robot1.right``, with more wheels ``robot1.wheel1`` and so on, and ``agent1`` if it has
+    one. Names in `named`, which the topology uses, take precedence.
 
     Raises
     ------
@@ -130,7 +129,7 @@ def team_of(
     """
     n = agents or 2 * (robots or 0) or len(named) or 4
     if n > MOST_AGENTS:
-        raise ValueError(f"agents = {n}, allowed: up to {MOST_AGENTS:,}, to be looked at")
+        raise ValueError(f"agents = {n}, allowed: up to {MOST_AGENTS:,} in a table or picture")
     robots = robots or (n if n % 2 else n // 2)
     if n % robots:
         raise ValueError(f"agents = {n} cannot be divided among robots = {robots}")
@@ -180,26 +179,33 @@ def format_view(view: HierarchyView, form: Form) -> str:
         }
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items())
         return "{" + ",\n ".join(lines) + "}"
-    beside = hierarchy.neighbors
-    pairs = sorted([*hierarchy.edges, *beside, *((b, a) for a, b in beside)])
+    neighbors = hierarchy.neighbors
+    pairs = sorted([*hierarchy.edges, *neighbors, *((b, a) for a, b in neighbors)])
     under = {i: [names[b] for a, b in pairs if a == i] for i in range(n)}
-    rows = [("", "agent", "lookahead", "tries", "neighbors" if beside else "subordinates")]
+    rows = [("", "agent", "lookahead", "tries", "neighbors" if neighbors else "subordinates")]
     for rank, i in enumerate(hierarchy.order):
         subordinates = ", ".join(under[i]) or "-"
         tried = format_count(view.tries[i])
         rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
     legend = [
-        "In order of decision. lookahead: number of agents that the agent searches over;",
-        "tries: joint actions a step with exhaustive search (large teams try fewer).",
+        "In decision order. lookahead: agents over whose actions the agent searches;",
+        "tries: joint actions a step in an exhaustive search (large teams try fewer).",
     ]
     return "\n".join([view.title, *view.remarks, "", *align(rows, "><>><"), "", *legend])
 
 
 def align(rows: Sequence[Sequence[str]], sides: str, heads: int = 0) -> list[str]:
-    """Return rows as lines, columns aligned to `sides` (< or >), within a terminal's width.
+    """Return rows as lines with aligned columns, at most as wide as the terminal.
 
-    What does not fit is cut; but with `heads`, columns beyond these first ones follow below, as a
-    further table, and texts of the last of `heads` that are too long for both are broken.
+    Parameters
+    ----------
+    rows
+        Cells.
+    sides
+        Alignment of each column, ``<`` or ``>``.
+    heads
+        Number of first columns that are repeated where further columns do not fit and continue in a
+        table below; long texts in the last of them are wrapped. By default, long lines are cut.
     """
     most = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
     if heads:
@@ -221,7 +227,7 @@ def align(rows: Sequence[Sequence[str]], sides: str, heads: int = 0) -> list[str
 
 
 def _broken(row: Sequence[str], column: int, most: int) -> Iterator[tuple[str, ...]]:
-    """Yield a row, and below it what is left of the text of a column if that is too long."""
+    """Yield the rows into which the long text of a column of a row is wrapped."""
     text = row[column]
     parts = wrap(text, most or 1) if len(text) > most else [text]
     cells = [parts if i == column else [cell] for i, cell in enumerate(row)]
@@ -229,7 +235,7 @@ def _broken(row: Sequence[str], column: int, most: int) -> Iterator[tuple[str, .
 
 
 def format_count(number: int, few: int = 10**9) -> str:
-    """Return an integer with all digits if it is below `few`, else in powers of ten.
+    """Return an integer with all digits if it is below `few`, else in scientific notation.
 
     Examples
     --------

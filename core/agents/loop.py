@@ -12,13 +12,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from numbers import Integral
-from time import perf_counter
 
 import numpy as np
 
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition, checked_scenario, checked_transition
-from ..numerics import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray, working_seconds
 from ..plugins.words import expect
 from .team import Team
 
@@ -111,13 +110,13 @@ def control_loop(
             team.begin_episode()
         team.check(seen)
         for step in range(steps):
-            begin = perf_counter()
+            begin = working_seconds()
             decision = team.act(seen, explore=explore)
-            decided = perf_counter()
+            decided = working_seconds()
             returned = world.step(decision.joint_action.copy())
             transition = checked_transition(returned, space, world.agents)
             last = transition.terminated or transition.truncated or step == steps - 1
-            moved = perf_counter()
+            moved = working_seconds()
             if learn:
                 team.learn(Experience(seen, decision, transition, last))
             yield StepRecord(
@@ -128,7 +127,7 @@ def control_loop(
                 transition=transition,
                 last=last,
                 deciding=decided - begin,
-                learning=perf_counter() - moved,
+                learning=working_seconds() - moved,
                 decision_costs=team.decision_costs,
             )
             if last:

@@ -69,11 +69,11 @@ class Variable:
     """Upper end of the range. For a periodic variable ``high - low`` is the period."""
     periodic: bool = False
     """Whether `low` and `high` are the same point, as for an angle."""
-    centres: tuple[float, ...] = ()
+    centers: tuple[float, ...] = ()
     """Default centers of the membership functions, increasing, within the range. If empty, they are
     spaced evenly, see `core.values.partitions.Partition.of`."""
     labels: tuple[str, ...] = ()
-    """Words for the membership functions, in the order of `centres`; numbers if empty."""
+    """Words for the membership functions, in the order of `centers`; numbers if empty."""
     mirrored: Literal["same", "opposite"] | None = None
     """Sign in the mirror image of the environment: the ``same`` or ``opposite``; None if unknown.
     See `core.models.predictors`."""
@@ -85,25 +85,25 @@ class Variable:
             raise ValueError(
                 f"variable {self.name!r}: range [{self.low}, {self.high}] must be finite, low first"
             )
-        expect_each("numbers", Real, centres=self.centres)
+        expect_each("numbers", Real, centers=self.centers)
         expect_each("words", str, labels=self.labels)
-        ordered = all(a < b for a, b in zip(self.centres, self.centres[1:], strict=False))
-        inside = all(self.low <= c <= self.high for c in self.centres)
+        ordered = all(a < b for a, b in zip(self.centers, self.centers[1:], strict=False))
+        inside = all(self.low <= c <= self.high for c in self.centers)
         if not (ordered and inside):
             raise ValueError(
-                f"variable {self.name!r}: centres {self.centres} must increase within "
+                f"variable {self.name!r}: centers {self.centers} must increase within "
                 f"[{self.low}, {self.high}]"
             )
-        if self.labels and len(self.labels) != len(self.centres):
+        if self.labels and len(self.labels) != len(self.centers):
             raise ValueError(
-                f"variable {self.name!r}: {len(self.labels)} labels for {len(self.centres)} centres"
+                f"variable {self.name!r}: {len(self.labels)} labels for {len(self.centers)} centers"
             )
 
 
 def choice(name: str, actions: tuple[str, ...]) -> Variable:
     """Return a variable for the index of an action, with a center at each action."""
-    centres = tuple(map(float, range(len(actions))))
-    return Variable(name, "1", 0.0, centres[-1], centres=centres, labels=actions)
+    centers = tuple(map(float, range(len(actions))))
+    return Variable(name, "1", 0.0, centers[-1], centers=centers, labels=actions)
 
 
 @dataclass(frozen=True)

@@ -162,10 +162,13 @@ class TDLambdaSettings(LearnerSettings):
     """Step size, alpha of Eq. 13."""
     trace_decay: Fraction = 0.4
     """Trace decay, lambda of Eq. 8."""
-    normalised: bool = False
+    normalized: bool = False
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Number of updates over which the agents average the learned weights to decide; 1: none."""
+    initial_weight: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    """Consequent weight of every rule before learning. With ``order = "full"`` it is the value of
+    every state; above attainable values it favors states that were not visited."""
     reward_of: Literal["left", "entered"] = "left"
     """Reward R in Eq. 7: that of the state left, s_previous, as printed; or that of the state
     entered, as in Section V, where rewards are computed after the move."""
@@ -180,7 +183,7 @@ class TDLambda(Online):
         e     = gamma lambda e + phi(s)            (Eq. 8, 12)
         theta = theta + alpha delta e              (Eq. 13)
 
-    With a normalised step size alpha is divided by the squared length of phi(s), so that
+    With a normalized step size alpha is divided by the squared length of phi(s), so that
     ``step_size = 1`` would remove the TD error of s at once.
 
     With ``reward_of = "entered"``, R(s') replaces R(s), another reading of Section V: a value then
@@ -198,20 +201,34 @@ class TDLambda(Online):
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
         self.reward_of = settings.reward_of
+        self.theta += settings.initial_weight
         self.updates: FloatArray = np.zeros(())
+        self._entered: tuple[IntArray, FloatArray] | None = None
         if settings.averaging > 1:
-            self.weights = np.zeros_like(self.theta)
+            self.weights = self.theta.copy()
             self.kept = (*self.kept, "weights", "updates")
+
+    def begin_episode(self) -> None:
+        """Clear the traces."""
+        super().begin_episode()
+        self._entered = None
+
+    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
+        """Continue from a `state_dict`."""
+        super().load_state_dict(state)
+        self._entered = None
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         lengths: FloatArray = np.ones(len(states))
-        if self.settings.normalised:
+        if self.settings.normalized:
             lengths = self.rules.squared_lengths(states)
         discount = 0.0 if entered is None else self.discount
         step_sizes = self.settings.step_size / lengths
         decay = self.discount * self.settings.trace_decay
-        active = self.rules.active(states)
+        # The states left are those entered before: their features are computed once.
+        active = self._entered or self.rules.active(states)
         active_next = active if entered is None else self.rules.active(entered)
+        self._entered = active_next
         constants = discount, step_sizes, decay
         td_lambda_update(
             self.weights, self.rows, self.trace, active, active_next, rewards, constants
@@ -364,8 +381,8 @@ class QLearning(OneStep):
                 "over, use td-lambda"
             )
         self._columns = sorted(rules.actions)
-        centres = [rules.partitions[column].centres for column in self._columns]
-        self._choices = np.array(list(product(*centres)))
+        centers = [rules.partitions[column].centers for column in self._columns]
+        self._choices = np.array(list(product(*centers)))
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         delta = self.errors(states, rewards, None)

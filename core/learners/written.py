@@ -28,8 +28,8 @@ class WrittenSettings(LearnerSettings):
 class Written(Frozen):
     """Never learns: f(s) is the sum over state variables of ``value`` times ``|s_j|``.
 
-    Consequent weights are the values of f at the centres of the membership functions. f is exact
-    for triangular ones between the outermost centres, if one centre is 0.
+    Consequent weights are the values of f at the centers of the membership functions. f is exact
+    for triangular ones between the outermost centers, if one center is 0.
 
     Raises
     ------
@@ -57,6 +57,6 @@ def _weights(value: Mapping[str, float], rules: RuleBase) -> FloatArray:
             )
         term = rules.terms.index((variable,))
         first = sum(rules.sizes[:term])
-        centres = np.array(rules.partitions[variable].centres)
-        weights[first : first + len(centres)] = worth * np.abs(centres)
+        centers = np.array(rules.partitions[variable].centers)
+        weights[first : first + len(centers)] = worth * np.abs(centers)
     return weights

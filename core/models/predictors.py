@@ -58,7 +58,7 @@ class LearnedPredictorSettings(PartSettings):
     """Pairs of variables used as features, in addition to single variables: none, pairs of a body's
     private variables, or all pairs including ``common`` variables."""
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
-    """Number of evenly spread membership functions per variable; with none, the centres of the
+    """Number of evenly spread membership functions per variable; with none, the centers of the
     state space."""
     midpoint: bool = False
     """Whether effects are evaluated at the midpoint of a decision instead of its beginning, for
@@ -170,7 +170,7 @@ class DrivenBodies:
     products
         Pairs of variables with rules of their own, see `LearnedPredictorSettings`.
     memberships
-        Membership functions per variable; None: the centres of the state space.
+        Membership functions per variable; None: the centers of the state space.
 
     Attributes
     ----------

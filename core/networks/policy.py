@@ -84,7 +84,7 @@ class Policy:
 
     @property
     def _normalizes_values(self) -> bool:
-        return self.settings.normalised == "values"
+        return self.settings.normalized == "values"
 
     def logits(self, actor_inputs: FloatArray) -> FloatArray:
         """Return the logits ``(m, h, A)`` for inputs of the actor ``(m, n_told + n_own)``."""

@@ -11,7 +11,7 @@ from .arrays import (
     wrap,
     wrap_one,
 )
-from .compiler import INNER, LOCK, Kernel, njit, serve, stamp
+from .compiler import INNER, LOCK, Kernel, njit, serve, stamp, working_seconds
 from .libraries import Deferred, nx, optimize, pd, special, stats
 from .random import set_words, stream_of, words_of
 
@@ -38,6 +38,7 @@ __all__ = [
     "stats",
     "stream_of",
     "words_of",
+    "working_seconds",
     "wrap",
     "wrap_one",
 ]

@@ -30,6 +30,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from time import perf_counter
 from types import CodeType, FunctionType
 from typing import IO, Any, TypeVar, cast
 
@@ -47,6 +48,16 @@ INNER = "-inner"
 """Suffix of the names of cached kernels that only kernels call."""
 
 _threads = threading.RLock()
+_preparation = {"seconds": 0.0}
+"""Time that this process has spent on compiling and loading kernels [s]."""
+
+
+def working_seconds() -> float:
+    """Return a clock [s] that stops while kernels are compiled or loaded.
+
+    Otherwise the first trial of a process would seem to take longer than the others.
+    """
+    return perf_counter() - _preparation["seconds"]
 
 
 class Kernel:
@@ -130,21 +141,27 @@ class Kernel:
 
     def __call__(self, *args: object) -> Any:
         """Call the compiled function."""
-        if self._ready is not None:
-            return self._ready(*args)
-        with _threads:
-            compiled = self.compiled
-            file = _cache_file(compiled)
-            if file is not None:
-                from .kernel_cache import lock_beside
+        if self._ready is None:
+            with _threads:
+                begin = perf_counter()
+                self._ready = self._prepared(args)
+                _preparation["seconds"] += perf_counter() - begin
+        return self._ready(*args)
 
-                types = tuple(map(compiled.typeof_pyval, args))
-                if not _is_cached(compiled, types):
-                    with lock_beside(file, LOCK):
-                        self._compile_apart(compiled, types)
-            result = compiled(*args)
-            self._ready = compiled
-        return result
+    def _prepared(self, args: tuple[object, ...]) -> Callable[..., Any]:
+        """Return the function, compiled or loaded for the types of some arguments."""
+        compiled: Any = self.compiled
+        file = _cache_file(compiled)
+        if file is None:
+            return cast(Callable[..., Any], compiled)
+        from .kernel_cache import lock_beside
+
+        types = tuple(map(compiled.typeof_pyval, args))
+        if not _is_cached(compiled, types):
+            with lock_beside(file, LOCK):
+                self._compile_apart(compiled, types)
+        compiled.compile(types)
+        return cast(Callable[..., Any], compiled)
 
     def _compile_apart(self, compiled: Any, types: tuple[object, ...]) -> None:
         """Compile the function for argument types in the child process, if possible."""

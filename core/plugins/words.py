@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
-from numbers import Real
+from numbers import Integral, Real
 from types import UnionType
 
 
@@ -56,7 +56,7 @@ def expect(allowed: str, kind: type | UnionType, /, **arguments: object) -> None
     allowed
         What is allowed, in words.
     kind
-        The types of it.
+        The allowed types. Truth values are no numbers.
     **arguments
         Values by name.
 
@@ -70,9 +70,13 @@ def expect(allowed: str, kind: type | UnionType, /, **arguments: object) -> None
     >>> expect("the names of agents", list | tuple, agents=6)
     Traceback (most recent call last):
     ValueError: agents = 6, allowed: the names of agents
+    >>> expect("a whole number", int, agents=True)
+    Traceback (most recent call last):
+    ValueError: agents = true, allowed: a whole number
     """
     for name, value in arguments.items():
-        if not isinstance(value, kind):
+        is_truth = isinstance(value, bool) and kind in (int, Integral, Real)
+        if is_truth or not isinstance(value, kind):
             raise ValueError(f"{name} = {show(value)}, allowed: {allowed}")
 
 

@@ -69,7 +69,7 @@ class Coordination(Aggregation):
         Properties that all decisions of the team share.
     name
         Name of the evaluator in messages.
-    maximiser
+    maximizer
         Finds the joint action of the greatest sum, for scopes, agents and actions.
 
     Raises
@@ -81,14 +81,14 @@ class Coordination(Aggregation):
     """
 
     def __init__(
-        self, problem: DecisionProblem, name: str, maximiser: Callable[..., Elimination | MaxPlus]
+        self, problem: DecisionProblem, name: str, maximizer: Callable[..., Elimination | MaxPlus]
     ) -> None:
         super().__init__(problem)
         self.name = name
         hierarchy = problem.hierarchy
         if hierarchy.edges or not hierarchy.neighbors:
             raise ValueError(
-                f"learner.decision.evaluator = {name!r}: the topology joins no neighbours, "
+                f"learner.decision.evaluator = {name!r}: the topology joins no neighbors, "
                 "use coordination-graph"
             )
         required = (
@@ -104,7 +104,7 @@ class Coordination(Aggregation):
         makers = len(problem.deciding) if problem.is_private else 1
         self.check_budget(makers * sum(self.n_actions ** len(scope) for scope in self.scopes))
         try:
-            self._maximiser = maximiser(self.scopes, n, self.n_actions)
+            self._maximizer = maximizer(self.scopes, n, self.n_actions)
         except ValueError as error:
             raise ValueError(f"learner.decision.evaluator = {name!r}: {error}") from None
         sizes = set(map(len, self.scopes))
@@ -118,7 +118,7 @@ class Coordination(Aggregation):
         agent = context.agent
         if self.begins(context):
             self._tables = [self._table(context, i) for i in range(len(self.scopes))]
-            self._best = self._maximiser.best(self._tables)
+            self._best = self._maximizer.best(self._tables)
         values = np.zeros(self.n_actions)
         for k in self._concerning[agent]:
             index = [slice(None) if i == agent else self._best[i] for i in self.scopes[k]]

@@ -187,7 +187,7 @@ class MaxPlus:
         k = max(map(len, apart))
         if n_actions**k > MAX_ENTRIES:
             raise ValueError(
-                f"an agent with {k - 1} neighbours in the coordination graph takes a table of "
+                f"an agent with {k - 1} neighbors in the coordination graph takes a table of "
                 f"{n_actions} ** {k} entries, allowed: {MAX_ENTRIES:,}"
             )
         # Shorter scopes are filled up with an agent that is not there, number n.

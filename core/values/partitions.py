@@ -1,13 +1,13 @@
 """Fuzzy partitions: membership functions over one state variable that sum to one.
 
-Two shapes are available, on a line or on a circle, with any number and spacing of centres:
+Two shapes are available, on a line or on a circle, with any number and spacing of centers:
 
-- *sigmoid* (Eq. 6 and Fig. 2 of the paper). With boundaries b_k halfway between neighboring centres
+- *sigmoid* (Eq. 6 and Fig. 2 of the paper). With boundaries b_k halfway between neighboring centers
   and S_k(x) = 1 / (1 + exp(-c_k (x - b_k))), membership function k is the difference
   S_{k-1}(x) - S_k(x). The differences telescope, so they sum to one. All functions are active
   everywhere.
-- *triangular*. Each function is one at its own centre and falls linearly to zero at the
-  neighboring centres. At most two functions are active at a time.
+- *triangular*. Each function is one at its own center and falls linearly to zero at the
+  neighboring centers. At most two functions are active at a time.
 
 On a circle the partition repeats with the period. Sigmoids are repeated over as many periods as
 their tails need to fall below 1e-11.
@@ -51,14 +51,14 @@ class Partition:
     [[1.0, 0.0], [0.75, 0.25], [0.0, 1.0]]
     """
 
-    centres: tuple[float, ...]
-    """``(m,)`` increasing centres, at least two."""
+    centers: tuple[float, ...]
+    """``(m,)`` increasing centers, at least two."""
     membership: Membership
     """``"triangular"`` or ``"sigmoid"``."""
     period: float = 0.0
     """Period of a circular variable, 0 for a linear one."""
     steepness: float = 8.0
-    """Sigmoid slope c_k times the distance of the two centres that it separates, above 0."""
+    """Sigmoid slope c_k times the distance of the two centers that it separates, above 0."""
 
     def __post_init__(self) -> None:
         if self.membership not in get_args(Membership):
@@ -66,19 +66,19 @@ class Partition:
                 f"partition: membership = {self.membership!r}, allowed: "
                 f"{', '.join(get_args(Membership))}"
             )
-        if len(self.centres) < 2:
-            raise ValueError(f"partition: centres = {self.centres}, at least two are needed")
-        if not all(map(isfinite, self.centres)):
-            raise ValueError(f"partition: centres = {self.centres}, all must be finite")
-        if any(a >= b for a, b in zip(self.centres, self.centres[1:], strict=False)):
-            raise ValueError(f"partition: centres {self.centres} must increase")
+        if len(self.centers) < 2:
+            raise ValueError(f"partition: centers = {self.centers}, at least two are needed")
+        if not all(map(isfinite, self.centers)):
+            raise ValueError(f"partition: centers = {self.centers}, all must be finite")
+        if any(a >= b for a, b in zip(self.centers, self.centers[1:], strict=False)):
+            raise ValueError(f"partition: centers {self.centers} must increase")
         if not 0.0 <= self.period < inf:
             raise ValueError(f"partition: period = {self.period}, allowed: 0 or a positive number")
         if not 0.0 < self.steepness < inf:
             raise ValueError(f"partition: steepness = {self.steepness}, must be above 0 and finite")
-        if self.period and self.centres[-1] - self.centres[0] >= self.period:
+        if self.period and self.centers[-1] - self.centers[0] >= self.period:
             raise ValueError(
-                f"partition: centres {self.centres} must lie within one period of {self.period}"
+                f"partition: centers {self.centers} must lie within one period of {self.period}"
             )
         if self.copies > MAX_COPIES:
             raise ValueError(
@@ -95,21 +95,21 @@ class Partition:
     ) -> Partition:
         """Return a partition of `variable`.
 
-        With `count`, that many centres are spread evenly over the range of the variable. Without,
-        the variable's own centres are used, or five evenly spread ones if it has none.
+        With `count`, that many centers are spread evenly over the range of the variable. Without,
+        the variable's own centers are used, or five evenly spread ones if it has none.
         """
-        centres = variable.centres
-        if count is not None or not centres:
+        centers = variable.centers
+        if count is not None or not centers:
             ends = not variable.periodic
             even = np.linspace(variable.low, variable.high, count or 5, endpoint=ends)
-            centres = tuple(map(float, even))
+            centers = tuple(map(float, even))
         period = variable.high - variable.low if variable.periodic else 0.0
-        return cls(centres, membership, period, steepness)
+        return cls(centers, membership, period, steepness)
 
     @property
     def size(self) -> int:
         """Number m of membership functions."""
-        return len(self.centres)
+        return len(self.centers)
 
     @property
     def copies(self) -> int:
@@ -118,14 +118,14 @@ class Partition:
             return 0
         if self.membership == "triangular":
             return 1
-        widest = max(np.diff([*self.centres, self.centres[0] + self.period]))
+        widest = max(np.diff([*self.centers, self.centers[0] + self.period]))
         return ceil(TAIL_EXPONENT * widest / (self.steepness * self.period))
 
     @cached_property
     def knots(self) -> FloatArray:
-        """Centres ``((1 + 2 copies) m,)``, with the copies of a circle on either side."""
+        """Centers ``((1 + 2 copies) m,)``, with the copies of a circle on either side."""
         turns = np.arange(-self.copies, self.copies + 1)
-        return (turns[:, None] * self.period + np.asarray(self.centres)).ravel()
+        return (turns[:, None] * self.period + np.asarray(self.centers)).ravel()
 
     @cached_property
     def _slopes(self) -> FloatArray:
@@ -135,8 +135,8 @@ class Partition:
 
     @cached_property
     def low(self) -> float:
-        """Lower end of the period that is centered on the centres."""
-        return 0.5 * (self.centres[0] + self.centres[-1] - self.period)
+        """Lower end of the period that is centered on the centers."""
+        return 0.5 * (self.centers[0] + self.centers[-1] - self.period)
 
     def strengths(self, x: FloatArray) -> FloatArray:
         """Return the membership degrees ``(..., m)`` of values ``(...)``; they sum to one."""

@@ -13,7 +13,8 @@ same order. `RuleBase.features` defines it; the kernels compute the same values 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import accumulate, combinations
 from math import prod
@@ -26,6 +27,7 @@ from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
+from ..plugins.words import closest
 from .partitions import Partition
 from .triangular import active_rules, layout, summed_values, values_of_agents, values_of_tables
 
@@ -36,10 +38,13 @@ class RuleBaseSettings(Settings):
     membership: Literal["triangular", "sigmoid"] = "triangular"
     """Shape of the membership functions. The paper uses differences of sigmoids (Eq. 6)."""
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
-    """Number of evenly spread membership functions per variable. With none, the centres of the
+    """Number of evenly spread membership functions per variable. With none, the centers of the
     state space are used."""
+    centers: Mapping[str, tuple[float, ...]] = Field(default_factory=dict)
+    """Centers of the membership functions by variable, in increasing order and in its unit; other
+    variables keep theirs."""
     steepness: Positive = 8.0
-    """Slope of a sigmoid times the distance of neighboring centres (c_j of Eq. 6)."""
+    """Slope of a sigmoid times the distance of neighboring centers (c_j of Eq. 6)."""
     order: Annotated[int, Field(ge=1, le=12)] | Literal["full"] = 1
     """Number of variables per rule. 1 is a sum of functions of one variable; ``full``, or the
     number of variables, is the paper's product of all. Use 2 if the effect of one variable depends
@@ -165,12 +170,20 @@ class RuleBase:
                 )
             terms.append(tuple(sorted(names.index(name) for name in product)))
         counts = dict.fromkeys(names, settings.memberships) | dict.fromkeys(space.actions)
-        partitions = [
-            Partition.of(v, settings.membership, counts[v.name], settings.steepness)
+        partitions = {
+            v.name: Partition.of(v, settings.membership, counts[v.name], settings.steepness)
             for v in space.variables
-        ]
+        }
+        for name, centers in settings.centers.items():
+            if name not in partitions or name in space.actions:
+                known = set(names) - set(space.actions)
+                raise ValueError(f"learner.rule_base.centers.{name}: {closest(name, known)}")
+            try:
+                partitions[name] = replace(partitions[name], centers=centers)
+            except ValueError as error:
+                raise ValueError(f"learner.rule_base.centers.{name}: {error}") from None
         return cls(
-            partitions,
+            list(partitions.values()),
             list(dict.fromkeys(terms)),
             space.n_own,
             settings.precision,
@@ -197,7 +210,7 @@ class RuleBase:
         """
         strengths = self._strengths(states)
         of_terms = [_products([strengths[j] for j in term], len(states)) for term in self.terms]
-        return np.concatenate(of_terms, axis=1)
+        return of_terms[0] if len(of_terms) == 1 else np.concatenate(of_terms, axis=1)
 
     def values(self, theta: FloatArray, states: FloatArray) -> FloatArray:
         """Return values ``(m,)`` of states ``(m, d)`` by the weights ``(n_rules,)`` of one agent.

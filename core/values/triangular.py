@@ -16,7 +16,7 @@ from .partitions import Partition
 Layout: TypeAlias = tuple[FloatArray, IntArray]
 """Partitions and terms as two arrays, one row per variable and one per term.
 
-Columns of the first are `COUNT`, `PERIOD`, `LOW` and, from `KNOTS` on, the centres; those of the
+Columns of the first are `COUNT`, `PERIOD`, `LOW` and, from `KNOTS` on, the centers; those of the
 second `OFFSET`, `LENGTH` and, from `FIRST` on, the variables. Passing few arrays saves time."""
 COUNT, PERIOD, LOW, KNOTS = range(4)
 OFFSET, LENGTH, FIRST = range(3)
@@ -32,9 +32,9 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]]) ->
     """Return partitions and terms as arrays for the kernels."""
     knots = [partition.knots for partition in partitions]
     variables = np.zeros((len(partitions), KNOTS + max(map(len, knots))))
-    for variable, partition, centres in zip(variables, partitions, knots, strict=True):
+    for variable, partition, centers in zip(variables, partitions, knots, strict=True):
         variable[:KNOTS] = partition.size, partition.period, partition.low
-        variable[KNOTS : KNOTS + len(centres)] = centres
+        variable[KNOTS : KNOTS + len(centers)] = centers
     of_terms = np.full((len(terms), FIRST + len(partitions)), -1, dtype=np.int64)
     offset = 0
     for row, term in zip(of_terms, terms, strict=True):
@@ -55,14 +55,14 @@ def _neighbors(j: int, x: float, variables: FloatArray) -> tuple[int, int, float
         low = variables[j, LOW]
         if not low <= x < low + period:
             x -= period * np.floor((x - low) / period)
-        # x lies between the last centre of the left copy and the first centre of the right copy.
+        # x lies between the last center of the left copy and the first center of the right copy.
         first = count - 1
         last = 2 * count - 1
     k = first
     while k < last and x >= variables[j, KNOTS + k + 1]:
         k += 1
-    centre = variables[j, KNOTS + k]
-    degree = (x - centre) / (variables[j, KNOTS + k + 1] - centre)
+    center = variables[j, KNOTS + k]
+    degree = (x - center) / (variables[j, KNOTS + k + 1] - center)
     lower = k if k < count else k - count
     upper = lower + 1 if lower + 1 < count else 0
     return lower, upper, min(max(degree, 0.0), 1.0)
@@ -193,8 +193,8 @@ def _add_lines(
 ) -> None:
     """Add the values of terms of one variable, of k agents in m states, to ``out`` ``(m,)``.
 
-    A piecewise linear function is its value at the first centre plus a change of slope at every
-    centre: loops over the states have no branch. This halves the decision time of large teams.
+    A piecewise linear function is its value at the first center plus a change of slope at every
+    center: loops over the states have no branch. This halves the decision time of large teams.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _add_lines(
         size = int(variables[j, COUNT])
         period = variables[j, PERIOD]
         low = variables[j, LOW]
-        # On a circle the line begins at the last centre of the copy before.
+        # On a circle the line begins at the last center of the copy before.
         start = size - 1 if period > 0.0 else 0
         end = 2 * size if period > 0.0 else size - 1
         for i in range(len(theta)):
@@ -229,15 +229,15 @@ def _add_lines(
                 xs[s] = x - period * np.floor((x - low) / period) if period > 0.0 else x
                 out[s] += value
             for k in range(start, end + 1):
-                centre = variables[j, KNOTS + k]
+                center = variables[j, KNOTS + k]
                 bend = -slope
                 if k < end:
                     after = theta[i, offset + (k + 1) % size]
-                    bend += (after - value) / (variables[j, KNOTS + k + 1] - centre)
+                    bend += (after - value) / (variables[j, KNOTS + k + 1] - center)
                     value = after
                 slope += bend
                 for s in range(n_states):
-                    beyond = xs[s] - centre
+                    beyond = xs[s] - center
                     out[s] += bend * (beyond if beyond > 0.0 else 0.0)
 
 

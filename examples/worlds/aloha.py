@@ -6,12 +6,12 @@ The task Aloha of the benchmark MACO (T. Wang et al. 2022) as a parallel environ
 written anew from its rules. The last function makes it a scenario of specs, see ``aloha.toml``.
 
 Islands stand in two rows. In every step each switches its radio on or leaves it off. A message is
-sent if no neighbour's radio is on; else it collides, stays in the backlog, and costs a hundred
-times what it would have brought. A radio disturbs the neighbours also where there is nothing to be
+sent if no neighbor's radio is on; else it collides, stays in the backlog, and costs a hundred
+times what it would have brought. A radio disturbs the neighbors also where there is nothing to be
 sent. All islands receive the team's reward, and see their own backlog alone.
 
 Departures. In the benchmark's public code islands 5 and 6, at opposite ends of the two rows, are
-neighbours, too; here they are not. An episode is truncated by its limit; there it is terminated.
+neighbors, too; here they are not. An episode is truncated by its limit; there it is terminated.
 Its agents remember what they saw (recurrent networks); what agents here see is this observation.
 """
 

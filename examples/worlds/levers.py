@@ -31,7 +31,7 @@ class Levers(na.Scenario, na.Prediction):
         self.roles = ("player",) * settings.players
         zeros = (0.0,) * len(LEVERS)
         self.action_set = na.ActionSet(LEVERS, zeros, zeros, neutral=0)
-        pulled, lit = (na.Variable(n, "1", 0, 2, centres=PLACES) for n in ("pulled", "lit"))
+        pulled, lit = (na.Variable(n, "1", 0, 2, centers=PLACES) for n in ("pulled", "lit"))
         self.state_space = na.StateSpace("levers", (pulled, lit), 1, actions=("pulled",))
 
     def reset(self, seed, episode=0):

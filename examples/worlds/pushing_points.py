@@ -141,7 +141,7 @@ def pushing_points(box: BoxSpec, count: int, gap: float) -> FloatArray:
     count
         How many.
     gap
-        From the centre of the body to the surface of the box [m].
+        From the center of the body to the surface of the box [m].
 
     Examples
     --------
@@ -334,7 +334,7 @@ def _state_space(
         )
     turns = np.arange(settings.bearings) * 2.0 * pi / settings.bearings - pi
     bearing = na.Variable(
-        "goal_bearing", "rad", -pi, pi, periodic=True, centres=tuple(turns.tolist())
+        "goal_bearing", "rad", -pi, pi, periodic=True, centers=tuple(turns.tolist())
     )
     if settings.observed == "own":
         own = choice("own_point", points)

@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nested_agents as na
-from nested_agents.figures import COLOURS
+from nested_agents.figures import COLORS
 
 from grade import grade
 
@@ -35,7 +35,7 @@ print(payments)
 learner = {
     "kind": "td-lambda",
     "step_size": 0.1,
-    "normalised": True,
+    "normalized": True,
     "discount": 0.0,
     "rule_base": {"order": "full"},
     "exploration": {"kind": "boltzmann"},
@@ -89,8 +89,8 @@ for ax, game in zip(axes, ("climbing", "penalty:-100"), strict=True):
     for row, one in enumerate(reversed(teams)):
         (label,) = (c for c in study.conditions if c.startswith(one["name"]) and c.endswith(game))
         share = na.rate(study.results.success(label, "evaluation"))
-        colour = COLOURS[0] if one["name"] == "nested, maximum" else "0.7"
-        ax.barh(row, share.value, color=colour)
+        color = COLORS[0] if one["name"] == "nested, maximum" else "0.7"
+        ax.barh(row, share.value, color=color)
         ax.plot([share.low, share.high], [row, row], "k", linewidth=3)
         ax.text(1.03, row, f"{share.value:.2f}", va="center")
     ax.set(xlim=(0, 1), title=game, xlabel="probability of the optimum")

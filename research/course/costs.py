@@ -18,12 +18,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.figures import COLOURS, STYLES
+from nested_agents.figures import COLORS, STYLES
 from nested_agents.parts import Problem, below_counts
 
 from grade import grade
 
-TOPOLOGIES = {"chain": "chain", "binary tree": "tree:2", "line of neighbours": "coordination-graph"}
+TOPOLOGIES = {"chain": "chain", "binary tree": "tree:2", "line of neighbors": "coordination-graph"}
 problem = Problem(actions=4)
 
 
@@ -55,7 +55,7 @@ figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 sizes = range(1, 17)
 for number, (name, topology) in enumerate(TOPOLOGIES.items()):
     counts = [tried(topology, n) for n in sizes]
-    ax.plot(sizes, counts, color=COLOURS[number], linestyle=STYLES[number], linewidth=4)
+    ax.plot(sizes, counts, color=COLORS[number], linestyle=STYLES[number], linewidth=4)
     beside = (12, (14, -14, 0)[number])  # chain and tree end close together
     ax.annotate(name, (16, counts[-1]), xytext=beside, textcoords="offset points", va="center")
 ax.set(yscale="log", xlabel="agents", ylabel="joint actions of a decision")
@@ -66,13 +66,13 @@ figure.savefig("out/course/costs.png", dpi=80)
 # %%
 # Questions
 # ---------
-# A line of neighbours decides by variable elimination, which is exact. Its further cost grows with
+# A line of neighbors decides by variable elimination, which is exact. Its further cost grows with
 # the width of the graph: the size of the tables that are left when one agent after the other goes.
 
 answers = {
     "chain": None,  # how many joint actions does a decision of a chain of eight agents try?
     "tree": None,  # and of a binary tree of eight?
-    "graph": None,  # and of a line of eight neighbours?
+    "graph": None,  # and of a line of eight neighbors?
     "factor": None,  # by which factor does one more agent multiply the work of a long chain?
     "step": None,  # how many joint actions does one more agent add to a long line?
     "width": None,  # elimination can be afforded by a: agents, b: edges, c: width of the graph

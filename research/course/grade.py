@@ -89,7 +89,7 @@ def grade(lab: str, answers: Mapping[str, Any], name: str = "") -> Marks:
     costs: 1 of 6
       chain   right
       tree    not answered
-      graph   wrong: an agent of a line has one neighbour or two
+      graph   wrong: an agent of a line has one neighbor or two
       factor  not answered
       step    not answered
       width   not answered

@@ -91,7 +91,7 @@ COSTS = Lab(
         "graph": Numeric(
             "And of a coordination graph that is a line of eight?",
             _tried("coordination-graph", 8),
-            hint="an agent of a line has one neighbour or two",
+            hint="an agent of a line has one neighbor or two",
         ),
         "factor": Numeric(
             "By which factor does one more agent multiply the work of a long chain?", 4, 0.1,
@@ -99,7 +99,7 @@ COSTS = Lab(
         ),
         "step": Numeric(
             "How many joint actions does one more agent add to a long line?", 4**3,
-            hint="the new agent is an end; the old end has now two neighbours",
+            hint="the new agent is an end; the old end has now two neighbors",
         ),
         "width": Choice(
             "Variable elimination is exact. What decides whether it can be afforded?",
@@ -108,7 +108,7 @@ COSTS = Lab(
                 "b": "the number of edges",
                 "c": "the width of the graph in the order of elimination",
             }, "c",
-            hint="think of a line of a thousand agents, and of ten who are all neighbours",
+            hint="think of a line of a thousand agents, and of ten who are all neighbors",
         ),
     },
 )  # fmt: skip

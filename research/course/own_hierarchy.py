@@ -17,7 +17,7 @@ the chain of the paper, and against agents who see nobody.
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.figures import COLOURS
+from nested_agents.figures import COLORS
 from nested_agents.parts import Problem, below_counts
 
 from grade import grade
@@ -58,11 +58,11 @@ print(study.compare())
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
 figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
-marks = zip(study.conditions, hierarchies, COLOURS, "osD", strict=False)
-for label, name, colour, marker in marks:
+marks = zip(study.conditions, hierarchies, COLORS, "osD", strict=False)
+for label, name, color, marker in marks:
     success = na.rate(study.results.success(label, "evaluation"))
-    ax.plot([costs[name]] * 2, [success.low, success.high], color=colour, linewidth=4)
-    ax.plot(costs[name], success.value, marker, color=colour, markersize=20, label=name)
+    ax.plot([costs[name]] * 2, [success.low, success.high], color=color, linewidth=4)
+    ax.plot(costs[name], success.value, marker, color=color, markersize=20, label=name)
 ax.set(xscale="log", ylim=(-0.02, 1.02), xlim=(10, 1000))
 ax.set_xticks([10, 100, 1000], ["10", "100", "1,000"])
 ax.set(xlabel="joint actions of a decision", ylabel="evaluation success, 95% interval")

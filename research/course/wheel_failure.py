@@ -22,7 +22,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nested_agents as na
-from nested_agents.figures import COLOURS, STYLES
+from nested_agents.figures import COLORS, STYLES
 
 from grade import grade
 
@@ -63,7 +63,7 @@ for number, (name, (success, ends)) in enumerate(lines.items()):
         means = success.mean(axis=0)[begin - ends[0] : end - ends[0]]
         smooth = np.convolve(means, np.ones(3) / 3, mode="valid")
         ax.plot(
-            begin + 1 + np.arange(len(smooth)), smooth, color=COLOURS[number],
+            begin + 1 + np.arange(len(smooth)), smooth, color=COLORS[number],
             marker="os^"[number], linestyle=STYLES[number], linewidth=4, markersize=12,
             label=name if end == EPISODES else None,
         )  # fmt: skip

@@ -138,7 +138,7 @@ class ScriptedController:
         return np.array(slots)
 
     def _back(self, side: Side, aside: float, radius: float) -> float:
-        """Return how far behind the box's centre a robot waits [m]."""
+        """Return how far behind the box's center a robot waits [m]."""
         if not self._hollow:
             return side.depth + radius + SLOT_GAP
         key = side.direction, aside, radius + SLOT_GAP

@@ -1,7 +1,7 @@
 """How three robots and more push a convex box: together, from one side or from two.
 
 Everyone who stands behind its side pushes where it stands; who does not is driven to a slot, and
-once enough stand, nobody waits for the rest. A wide box turns slowly: per metre of way by about the
+once enough stand, nobody waits for the rest. A wide box turns slowly: per meter of way by about the
 lever of the robots over the square of the box's friction radius, which falls as one over the number
 of robots. What turning cannot do in the way that is left, robots do by pushing obliquely, within
 the friction cone, and what that cannot do by pushing from a second side as well.
@@ -280,7 +280,7 @@ class Crowd:
         dx, dy = robots[:, :, 0] - boxes[:, :1], robots[:, :, 1] - boxes[:, 1:2]
         aside = np.cos(heading) * dy - np.sin(heading) * dx - middle
         cost += 10.0 * np.maximum(np.abs(aside) - half + 0.03, 0.0).sum(axis=1)
-        for team in (plan.second, ~plan.second):  # neighbours keep clear of each other
+        for team in (plan.second, ~plan.second):  # neighbors keep clear of each other
             order = np.flatnonzero(team)[np.argsort(aside[0, team])]
             apart = np.hypot(*np.diff(robots[:, order, :2], axis=1).transpose(2, 0, 1))
             close = 2.0 * self._radius + CLEARANCE - apart

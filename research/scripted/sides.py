@@ -23,7 +23,7 @@ SPREAD = 0.55
 SQUARE = 0.9
 """Least cosine between the direction of pushing and the normal of a contact face."""
 MARGIN = 0.35
-"""Fraction of a robot's radius to either side of its centre that must face the box squarely."""
+"""Fraction of a robot's radius to either side of its center that must face the box squarely."""
 GRID = 41
 """Places across a concave box that are looked at."""
 
@@ -34,7 +34,7 @@ class Side(NamedTuple):
     direction: float
     """Of pushing [rad]."""
     depth: float
-    """Distance of the side from the centre, against `direction` [m]."""
+    """Distance of the side from the center, against `direction` [m]."""
     middle: float
     """Middle of the usable side, to the left of `direction` [m]."""
     half: float
@@ -57,14 +57,14 @@ def behind(box: BoxSpec, direction: float, aside: float, gap: float) -> tuple[fl
     box
         The box.
     direction, aside
-        Direction of pushing [rad], and how far the body is to the left of the centre [m].
+        Direction of pushing [rad], and how far the body is to the left of the center [m].
     gap
-        From the body's centre to the surface [m].
+        From the body's center to the surface [m].
 
     Returns
     -------
     back, square : float
-        How far the body's centre is behind that of the box [m], and the cosine between the
+        How far the body's center is behind that of the box [m], and the cosine between the
         direction and the inward normal of the face.
     """
     origin = -aside * sin(direction), aside * cos(direction)
@@ -109,7 +109,7 @@ def _edges(polygon: Polygon) -> Iterator[Side]:
 
 
 def _stand(box: BoxSpec, direction: float, robots: int, span: float) -> Side | None:
-    """Return where robots push a concave box in a direction: far apart, around the centre."""
+    """Return where robots push a concave box in a direction: far apart, around the center."""
     ends = box.shape.edges[:, :2] @ np.array([-sin(direction), cos(direction)])
     low, high = float(ends.min()), float(ends.max())
     places = np.linspace(low, high, GRID)

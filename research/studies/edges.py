@@ -73,7 +73,7 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train a team, let it act under all hierarchies; imported by name in workers."""
-    session = Session.compiled(trial)
+    session = Session(trial)
     session.train(trial.episodes)
     deciding: dict[str, list[float]] = {n: [] for n in (TRAINED, *dict(trial.evaluations))}
 
@@ -119,7 +119,7 @@ def draw(analysis: Analysis) -> Figures:
 
 
 def _draw_parted(analysis: Analysis) -> Figures:
-    """Draw success by telling and considering: four fields of a colour for each setting."""
+    """Draw success by telling and considering: four fields of a color for each setting."""
     from nested_agents import figures
 
     cases = sorted(analysis.cases, key=lambda case: (case.group, case.robots))
@@ -134,8 +134,8 @@ def _draw_parted(analysis: Analysis) -> Figures:
         axes.imshow(fields[..., 0], "Blues", vmin=0, vmax=1)
         for row, column in np.ndindex(2, 2):
             value, low, high = map(format_number, fields[row, column])
-            colour = "white" if fields[row, column, 0] > 0.5 else "black"
-            write = partial(axes.text, column, ha="center", color=colour)
+            color = "white" if fields[row, column, 0] > 0.5 else "black"
+            write = partial(axes.text, column, ha="center", color=color)
             write(row, value, va="bottom", fontsize=15)
             write(row + 0.08, f"[{low}, {high}]", va="top", fontsize=7)
         axes.set_title(setting, loc="left")

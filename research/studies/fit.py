@@ -79,8 +79,8 @@ def draw(analysis: Analysis) -> Figures:
         axes.set_title(game, loc="left")
         for case in (case for case in cases if case.setting == game):
             row = edges.index(case.name)
-            colour = f.look(row)["color"]
-            f.draw_row(axes, row, case.values[EVALUATED], color=colour, marker=f.marker(row))
+            color = f.look(row)["color"]
+            f.draw_row(axes, row, case.values[EVALUATED], color=color, marker=f.marker(row))
         f.as_rates(axes, "x")
         axes.grid(axis="x", alpha=0.25)
     f.name_rows(panels[0, 0], edges)

@@ -92,7 +92,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure: probabilities of the optimum with their 95% intervals.
 
     A panel for each game (the first thing that settings differ in), the systems one below the
-    other, a colour and a marker for the rest of the setting; what is filled has been measured after
+    other, a color and a marker for the rest of the setting; what is filled has been measured after
     all plays.
     """
     from nested_agents import figures as f
@@ -104,9 +104,9 @@ def draw(analysis: Analysis) -> Figures:
     plays = sorted({count for case in cases for count in case.values})
     looks = {}
     for (i, rest), count in product(enumerate(rests), plays):
-        colour = f.look(i)["color"]
-        face = colour if count == plays[-1] else "white"
-        looks[rest, count] = {"color": colour, "marker": f.marker(i), "markerfacecolor": face}
+        color = f.look(i)["color"]
+        face = color if count == plays[-1] else "white"
+        looks[rest, count] = {"color": color, "marker": f.marker(i), "markerfacecolor": face}
     places = dict(zip(looks, f.beside(len(looks)), strict=True))
     each = 2.3, 0.5 + 0.24 * len(systems)
     figure, panels = f.grid(len(games), COLUMNS, each, (1.8, 0.9), sharex=True, sharey=True)

@@ -46,7 +46,7 @@ def stops(episodes: int) -> list[int]:
 
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
-    session = Session.compiled(trial)
+    session = Session(trial)
     done = 0
     seconds = 0.0
     usage = {}
@@ -113,8 +113,8 @@ def analyse(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluations against experience, a panel for each condition.
 
-    The condition's line has a colour, and a band for its 95% intervals; those of the others are
-    grey.
+    The condition's line has a color, and a band for its 95% intervals; those of the others are
+    gray.
     """
     from matplotlib.ticker import LogLocator
 

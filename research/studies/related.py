@@ -7,7 +7,7 @@ it succeeds when evaluated, and after how many decisions; and of a decision of a
 - its time;
 - the memory of all that is learned;
 - messages: the actions that agents tell one another. A superior tells each agent below it what it
-  has decided. Neighbours tell each other what they have done, or in a coordination graph what would
+  has decided. Neighbors tell each other what they have done, or in a coordination graph what would
   be best; max-plus does so in every round, of which one is counted;
 - operations: joint actions tried times the rules that value each, by the formula of the topology
   (sum over agents of ``|A| ** (1 + |below|)``, times |S|) and as counted in the running system.
@@ -58,7 +58,7 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and count what it takes; imported by name in workers."""
-    session = Session.compiled(trial)
+    session = Session(trial)
     session.train(trial.episodes)
     team = session.team.only(FuzzyAgents)
     hierarchy = team.hierarchy
@@ -112,7 +112,7 @@ def name_world(swept: Mapping[str, object]) -> str:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: the systems one below the other, a colour for each world.
+    """Return the figure: the systems one below the other, a color for each world.
 
     Bars are 95% intervals.
     """
@@ -129,9 +129,9 @@ def draw(analysis: Analysis) -> Figures:
     for axes, (name, title) in zip(panels, PANELS.items(), strict=True):
         for case in cases:
             which = worlds.index(case.setting)
-            colour = f.look(which)["color"]
+            color = f.look(which)["color"]
             row = systems.index(case.system) + places[which]
-            f.draw_row(axes, row, case.values[name], color=colour, markersize=3)
+            f.draw_row(axes, row, case.values[name], color=color, markersize=3)
         axes.set_title(title, loc="left")
         axes.grid(axis="x", alpha=0.25)
         if name in LEAST:

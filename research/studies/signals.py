@@ -116,7 +116,7 @@ def _notes(cases: list[SignalsCase]) -> list[str]:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: shares by number of agents; in grey, what theory says."""
+    """Return the figure: shares by number of agents; in gray, what theory says."""
     from nested_agents import figures as f
 
     cases = analysis.cases
@@ -136,7 +136,7 @@ def draw(analysis: Analysis) -> Figures:
         f.scale_axis(axes, sorted({case.agents for case in cases}))
         axes.set_title(title, loc="left")
         axes.set_xlabel(cases[0].sizes.word)
-    f.name_lines(figure, systems, "means over seeds, bars: 95% intervals; grey: theory")
+    f.name_lines(figure, systems, "means over seeds, bars: 95% intervals; gray: theory")
     return {"signals": figure}
 
 

@@ -136,17 +136,17 @@ class StateReader:
     def _variable(self, name: str, explored: Callable[[], FloatArray]) -> Variable | None:
         """Return a state variable; None for an unnamed number that never changes."""
         settings = self._settings
-        centres = settings.centres.get(name, ())
+        centers = settings.centers.get(name, ())
         if name in settings.angles:
-            return Variable(name, "rad", -np.pi, np.pi, periodic=True, centres=centres)
+            return Variable(name, "rad", -np.pi, np.pi, periodic=True, centers=centers)
         low, high = settings.ranges.get(name) or self._range(self._bounds, name)
         if not np.isfinite([low, high]).all():
             low, high = self._range(explored(), name)
         if low < high:
             is_discrete = all(isinstance(own.space, Discrete) for own in self._entries)
-            if is_discrete and not centres and high - low < MAX_CENTRES:
-                centres = tuple(np.arange(low, high + 1.0).tolist())
-            return Variable(name, "1", low, high, centres=centres, bounds=self._bounds_of(name))
+            if is_discrete and not centers and high - low < MAX_CENTRES:
+                centers = tuple(np.arange(low, high + 1.0).tolist())
+            return Variable(name, "1", low, high, centers=centers, bounds=self._bounds_of(name))
         if settings.variables:
             raise ValueError(
                 f"scenario.variables.{name}: has no bounds and is always {low:g} in random "
@@ -174,7 +174,7 @@ class StateReader:
         success = settings.success if isinstance(settings.success, dict) else {}
         tables = {
             "ranges": settings.ranges.keys(),
-            "centres": settings.centres.keys(),
+            "centers": settings.centers.keys(),
             "success": success.keys() - {"return"},
         }
         for key, used in tables.items():

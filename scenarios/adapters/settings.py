@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from ...core.plugins.settings import ScenarioSettings, Settings
 
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
-Centres = Annotated[tuple[float, ...], Field(min_length=2)]
+Centers = Annotated[tuple[float, ...], Field(min_length=2)]
 Index = Annotated[int, Field(ge=0)]
 Entry = Index | str
 """A number of the observation, by index from 0 or by name."""
@@ -84,7 +84,7 @@ class EnvironmentSettings(ScenarioSettings):
     ranges: dict[str, Range] = Field(default_factory=dict)
     """Ranges of state variables. By default the bounds of the observation space, or what random
     episodes reach where it has none."""
-    centres: dict[str, Centres] = Field(default_factory=dict)
+    centers: dict[str, Centers] = Field(default_factory=dict)
     """Increasing centers of the membership functions of state variables, evenly spaced by default.
     ``learner.rule_base.memberships`` spaces all of them evenly."""
     rewards: Literal["joint", "own"] = "joint"

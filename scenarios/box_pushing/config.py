@@ -42,8 +42,9 @@ class BoxTaskSettings(ScenarioSettings):
     """Box by name, or a table that describes one."""
     infrared: InfraredSettings = InfraredSettings()
     """Response of the infrared sensors of all robots."""
-    start: Literal["easy", "medium", "hard"] = "medium"
-    """Distribution of start poses: how far off the course to the goal robots and box begin."""
+    start: Literal["fixed", "easy", "medium", "hard"] = "medium"
+    """Distribution of start poses: how far off the course to the goal robots and box begin. With
+    ``fixed`` every episode starts in the same poses, on the course."""
     scaling: Literal["fixed", "similar"] = "fixed"
     """Whether the box's distance to the goal, `tolerance`, `termination_radius` and the reward's r1
     stay as they are whatever the number of robots, or are in units of the box and grow with it."""
@@ -85,11 +86,11 @@ class BoxPushingSettings(BoxTaskSettings):
     kind: Literal["box-pushing"] = "box-pushing"
     factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
     state_space: Annotated[
-        Literal["paper", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
+        Literal["paper", "paper-box", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
         names_of(STATE_VARIABLES),
     ] = "relational"
-    """Built-in state space by name (``paper`` is Eq. 1), or a list of state variables by name,
-    built in or user-defined."""
+    """Built-in state space by name, or a list of state variables by name, built in or user-defined.
+    ``paper`` is Eq. 1; in ``paper-box`` the goal of an agent (phi_i and d_i) is the box."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
     """Model of predictions: robots that yield to the box (``push``), robots that do not
     (``rigid``), a box that does not move (``static``), or the simulation itself (``exact``)."""

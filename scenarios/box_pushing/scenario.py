@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,7 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
-from ...core.numerics import FloatArray, IntArray, stream_of, wrap
+from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
@@ -174,9 +173,9 @@ class BoxPushing(Scenario, Embodiment):
         """Command the wheels, simulate one decision period, observe and reward."""
         self._speeds = self.commanded(self._speeds, joint_action)
         before = self.world.poses
-        begin = perf_counter()
+        begin = working_seconds()
         self._advance(self._speeds)
-        moved = perf_counter()
+        moved = working_seconds()
         present = self._present(before[0])
         states = self.states_at(present, self._speeds[None])[0]
         readings = self.world.infrared()
@@ -190,7 +189,7 @@ class BoxPushing(Scenario, Embodiment):
         away = float(distance[0])
         measured = self._measured(away, float(turn[0]))
         terminated = bool(self.task.reached(distance, turn)[0])
-        sensed = perf_counter()
+        sensed = working_seconds()
         twists = partial(_twists, before, self.world.poses, self._period, self.robot.radius)
         if terminated:
             # The wheels stop; the box may leave the tolerance before it comes to rest.
@@ -348,10 +347,12 @@ class BoxPushing(Scenario, Embodiment):
         m, n_robots, _ = shared.shape
         n_own = self.state_space.n_own
         poses = batch.robots.transpose(2, 0, 1)
+        boxes = batch.boxes.T
         if self.space.own_needs_pose:
             poses = poses[:, self.body]
+            boxes = np.repeat(boxes, len(self.agents), axis=0)
         states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
-        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), self._goal)
+        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), boxes, self._goal)
         states[..., :n_own] = own.reshape(*states.shape[:3], -1)
         states[..., n_own:] = shared[:, :, None]
         return states.reshape(*speeds.shape, -1)

@@ -23,7 +23,7 @@ Recording = Mapping[str, FloatArray]
 
 SIDE = 480
 """Width and height of a picture in pixels."""
-# Colour-blind-safe (Okabe and Ito 2008), as in the pictures of box pushing.
+# Color-blind-safe (Okabe and Ito 2008), as in the pictures of box pushing.
 LINK = "#0072B2"
 TIP = "#E69F00"
 GOAL = "#555555"

@@ -86,12 +86,12 @@ def _write_bearings(
 
 @njit(cache=True)
 def _rotated(
-    point: tuple[float, float], centre: tuple[float, float], angle: float
+    point: tuple[float, float], center: tuple[float, float], angle: float
 ) -> tuple[float, float]:
     """Return a point after a rotation about a center by an angle [rad]."""
     cos, sin = np.cos(angle), np.sin(angle)
-    dx, dy = point[0] - centre[0], point[1] - centre[1]
-    return centre[0] + cos * dx - sin * dy, centre[1] + sin * dx + cos * dy
+    dx, dy = point[0] - center[0], point[1] - center[1]
+    return center[0] + cos * dx - sin * dy, center[1] + sin * dx + cos * dy
 
 
 @njit(cache=True)

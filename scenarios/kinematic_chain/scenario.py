@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from ...core.interface.prediction import EmbodiedPrediction, first_alike
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
-from ...core.numerics import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray, working_seconds
 from ...core.plugins.words import expect
 from ...core.search.best_response import RespondingPrediction, Responses, Search
 from ...core.values.rule_base import RuleBase
@@ -113,7 +112,7 @@ class KinematicChain(Scenario, Embodiment):
 
     def step(self, joint_action: IntArray) -> Transition:
         """Turn the joints for one decision period."""
-        begin = perf_counter()
+        begin = working_seconds()
         before = self._distance()
         angles = self._angles
         self._failures.strike(self._step)
@@ -122,7 +121,7 @@ class KinematicChain(Scenario, Embodiment):
         held = self._failures.driven(self._speeds, periods=1)[0]
         self._angles = np.clip(angles + PERIOD * held, -self._max_angles, self._max_angles)
         self._step += 1
-        moved = perf_counter()
+        moved = working_seconds()
         states = self._observe(before)
         info = self.measure()
         distance = np.array([info["distance_m"]])
@@ -131,7 +130,7 @@ class KinematicChain(Scenario, Embodiment):
         twists = np.zeros((len(angles), 3))
         twists[:, 2] = (self._angles - angles) / PERIOD
         reward = float(self._reward(distance, before - distance)[0])
-        info["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
+        info["seconds"] = {"physics": moved - begin, "sensors": working_seconds() - moved}
         return Transition(states, reward, terminated, truncated, info, twists)
 
     def environments(self, count: int) -> ChainEnvironments | None:

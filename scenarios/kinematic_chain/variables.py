@@ -108,7 +108,7 @@ def _length(vectors: FloatArray) -> FloatArray:
     return length
 
 
-@state_variable("rad", -pi, pi, periodic=True, centres=BEARINGS, mirrored="opposite")
+@state_variable("rad", -pi, pi, periodic=True, centers=BEARINGS, mirrored="opposite")
 def bearing(view: ChainView, joint: Joints) -> FloatArray:
     """Angle at the joint from the tip to the goal: the turn that would point the tip at it."""
     to_tip = view.tip - view.places[:-1][joint]
@@ -118,19 +118,19 @@ def bearing(view: ChainView, joint: Joints) -> FloatArray:
     return np.arctan2(cross, dot)
 
 
-@state_variable("m", 0.0, 2.0, centres=DISTANCES, common=True, mirrored="same")
+@state_variable("m", 0.0, 2.0, centers=DISTANCES, common=True, mirrored="same")
 def distance(view: ChainView, joint: Joints) -> FloatArray:
     """Distance of the tip from the goal."""
     return view.distance
 
 
-@state_variable("m", -0.2, 0.2, centres=APPROACHES, common=True, mirrored="same")
+@state_variable("m", -0.2, 0.2, centers=APPROACHES, common=True, mirrored="same")
 def approach(view: ChainView, joint: Joints) -> FloatArray:
     """Decrease of the tip's distance from the goal in the last decision."""
     return view.approach
 
 
-@state_variable("rad", -pi, pi, centres=(-2.5, -1.25, 0.0, 1.25, 2.5), mirrored="opposite")
+@state_variable("rad", -pi, pi, centers=(-2.5, -1.25, 0.0, 1.25, 2.5), mirrored="opposite")
 def angle(view: ChainView, joint: Joints) -> FloatArray:
     """Angle of the joint within one turn, which matters if joints have limits."""
     return (view.angles[joint] + pi) % (2.0 * pi) - pi
@@ -142,7 +142,7 @@ def lever(view: ChainView, joint: Joints) -> FloatArray:
     return _length(view.tip - view.places[:-1][joint])
 
 
-@state_variable("m", -1.0, 1.0, centres=(-0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5), mirrored="same")
+@state_variable("m", -1.0, 1.0, centers=(-0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5), mirrored="same")
 def excess(view: ChainView, joint: Joints) -> FloatArray:
     """Distance of the goal from the joint minus that of the tip: positive means to stretch."""
     return _length(view.goal - view.places[:-1][joint]) - lever.function(view, joint)
@@ -154,7 +154,7 @@ CHAIN_VARIABLES = Registry("chain variable", {name: f"{__name__}:{name}" for nam
 
 SPEEDS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Centers of the joint's own speed, as a fraction of the maximum, for arms of any length."""
-SPEED = Variable("speed", "1", -1.0, 1.0, centres=SPEEDS, mirrored="opposite")
+SPEED = Variable("speed", "1", -1.0, 1.0, centers=SPEEDS, mirrored="opposite")
 
 
 class ChainStates:

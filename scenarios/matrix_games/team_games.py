@@ -37,7 +37,7 @@ SHARE_OF_BEST = Measure(
 )
 Entropy = int | Sequence[int] | None
 """Entropy of a seed."""
-PLAY = Variable("play", "1", 0.0, 1.0, centres=(0.0, 1.0))
+PLAY = Variable("play", "1", 0.0, 1.0, centers=(0.0, 1.0))
 """Constant observation of agents that observe nothing."""
 
 

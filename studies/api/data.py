@@ -37,7 +37,7 @@ from .comparison import Comparison
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..scalability.laws import Scaling
+    from ..laws.universal import Scaling
     from ..scalability.prediction import PredictionCheck
     from ..scalability.report import ScalabilityReport
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 from ...core.plugins.words import expect, expect_each
 from ..cost.profile import search_method
+from ..laws import scaling
+from ..laws.size_axis import SizeAxis, columns_of
 from ..presentation.tables import SummaryTable, tabulate
-from ..results import scaling_law as laws_of_results
 from ..results.results import Results
-from ..spec.tables import label_but
 from ..trials.arrangement import arrange
 from .study import StudyResults
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class Growth:
     """Growth of a measure with size; printed, it is a table with sentences."""
 
-    analysis: laws_of_results.ScalingLaw
+    analysis: scaling.ScalingLaw
     """The laws, group by group."""
 
     @cached_property
@@ -92,7 +92,7 @@ def scaling_law(
     expect_each("whole numbers", Integral, predict=predict)
     results = study.results_by_size(size)
     name = results.main.name if measure is None else measure
-    law = laws_of_results.scaling_law(
+    law = scaling.scaling_law(
         results, name, phase=phase, size=size, criterion=criterion, predict=predict
     )
     return Growth(law._replace(remarks=_method_remarks(study, results, size)))
@@ -104,22 +104,20 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
     A team of each condition is built to find its method. A study with untrusted files, or one that
     is known by its table alone, has no methods.
     """
-    columns = laws_of_results.columns_of(results)
-    key = laws_of_results.size_key(columns, size)
+    axis = SizeAxis.of(columns_of(results), size)
     groups: dict[str, list[tuple[float, str]]] = {}
     for condition, settings in study.condition_settings().items():
-        if condition in columns:
-            row = columns[condition]
+        if condition in axis.places:
+            group, n = axis.places[condition]
             with study._sources.active(), suppress(ValueError, ImportError):
                 method = search_method(arrange(settings, 0).team)
-                groups.setdefault(label_but(row, [key]), []).append((float(str(row[key])), method))
-    name = key.rpartition(".")[2]
+                groups.setdefault(group, []).append((n, method))
     changes: dict[str, list[str]] = {}
     for group, members in groups.items():
         first = {method: n for n, method in sorted(members, reverse=True)}
         steps = sorted((n, method) for method, n in first.items())
         if len(steps) > 1:
-            text = ", ".join(f"{method} from {n:g} {name}" for n, method in steps)
+            text = ", ".join(f"{method} from {n:g} {axis.name}" for n, method in steps)
             changes.setdefault(text, []).append(group)
     remarks = []
     for text, own in changes.items():

@@ -19,14 +19,13 @@ import numpy as np
 from ...core.interface.measures import Measure, main_measure
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
+from ..laws.fitting import FEWEST
+from ..laws.size_axis import SizeAxis
 from ..presentation.progress import count, duration
-from ..results.laws import FEWEST
 from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.power_text import exponent_text, planned_text
-from ..results.scaling_law import size_key
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
-from ..spec.tables import label_but
 from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import cores
@@ -118,14 +117,10 @@ class Plan:
 
     def _exponents(self) -> Iterator[str]:
         """Yield which differences of scaling exponents the study can detect, if it sweeps sizes."""
-        columns = self.outline.columns
         with suppress(SpecError):
-            key = size_key(columns)
-            groups: dict[str, list[float]] = {}
-            for own in columns.values():
-                groups.setdefault(label_but(own, [key]), []).append(float(own[key]))
-            _, fewest = min((len(own), sorted(own)) for own in groups.values())
-            if len(fewest) >= FEWEST and fewest[0] > 0.0:
+            groups = SizeAxis.of(self.outline.columns).groups()
+            _, fewest = min((len(own), [*own.values()]) for own in groups.values())
+            if len(fewest) >= FEWEST:
                 yield ""
                 yield from exponent_text(fewest, len(self.outline.seeds), max(1, len(groups) - 1))
 

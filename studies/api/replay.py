@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...core.interface.abilities import Animated
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..store.store import Store
 
@@ -56,7 +56,7 @@ def draw_episode(
         if episode == "first" and episode not in recorded:
             episode = "last"  # of one episode
         if episode not in recorded:
-            raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
+            raise SpecError(f"episode = {show(episode)}: {closest(episode, recorded)}")
         scenario = trial.world()
         if not isinstance(scenario, Animated):
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")

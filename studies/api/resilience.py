@@ -62,7 +62,8 @@ def measure_resilience(
                     entry = f"{EVALUATION}{k}"
                     own.lost[units] = evaluated.by_seed(own.condition, entry, shown_as.name)
             n_lost = next_number(n_lost)
-    return ResilienceReport(Resilience(fault, shown_as, title, tolerance, able))
+    left_out = tuple(own.condition for own in teams if own.intact_mean <= 0.0)
+    return ResilienceReport(Resilience(fault, shown_as, title, tolerance, able, left_out))
 
 
 def _trials_with_losses(

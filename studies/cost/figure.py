@@ -86,8 +86,8 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
             _scale(axes, sizes)
         handles = [_handle(name, look) for name, look in looks.items()]
         if is_measured:
-            handles.append(figures.handle("lines: formula", color="grey"))
-            handles.append(figures.handle("markers: measured", ls="", marker="o", color="grey"))
+            handles.append(figures.handle("lines: formula", color="gray"))
+            handles.append(figures.handle("markers: measured", ls="", marker="o", color="gray"))
         figures.add_legend(figure, handles, ncols=1 + columns)
         figures.write(figures.spell_dollars(figure, names), path)
 

@@ -38,7 +38,7 @@ class Parts:
     constant: float
     """Mean of all rules."""
     singles: tuple[FloatArray, ...]
-    """``(m_j,)`` consequents of every variable j, of mean zero: g_j at the centres."""
+    """``(m_j,)`` consequents of every variable j, of mean zero: g_j at the centers."""
     variance: float
     """Variance over all rules."""
 
@@ -95,7 +95,7 @@ def _variance(tensors: Sequence[tuple[tuple[int, ...], FloatArray]]) -> float:
 def labels(variable: Variable, partition: Partition) -> tuple[str, ...]:
     """Return words for the membership functions of a variable.
 
-    Its own words if the partition is its own; else by rank, or by the centre on a circle.
+    Its own words if the partition is its own; else by rank, or by the center on a circle.
 
     Examples
     --------
@@ -103,11 +103,11 @@ def labels(variable: Variable, partition: Partition) -> tuple[str, ...]:
     >>> labels(gap, Partition.of(gap))
     ('very low', 'low', 'medium', 'high', 'very high')
     """
-    if variable.labels and variable.centres == partition.centres:
+    if variable.labels and variable.centers == partition.centers:
         return variable.labels
     if not variable.periodic and partition.size in WORDS:
         return WORDS[partition.size]
-    return tuple(f"about {place(variable, centre)}" for centre in partition.centres)
+    return tuple(f"about {place(variable, center)}" for center in partition.centers)
 
 
 def place(variable: Variable, value: float) -> str:

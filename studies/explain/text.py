@@ -115,8 +115,8 @@ def _names_of_rules(explained: Explanation, j: int) -> list[str]:
     """Return the membership functions of a variable in words, each with its center."""
     variable = explained.variables[j]
     partition = explained.rules.partitions[j]
-    words = zip(labels(variable, partition), partition.centres, strict=True)
-    return [f"{word} ({place(variable, centre)})" for word, centre in words]
+    words = zip(labels(variable, partition), partition.centers, strict=True)
+    return [f"{word} ({place(variable, center)})" for word, center in words]
 
 
 def _self_model_lines(explained: Explanation) -> list[str]:
@@ -178,8 +178,8 @@ def _draw_functions(explained: Explanation) -> Figure:
         is_angle = variable.unit == "rad"
         if is_angle:
             axes.xaxis.set_major_locator(MultipleLocator(90))
-        ends = (variable.low, variable.high) if variable.periodic else partition.centres
-        x = np.union1d(np.linspace(min(ends), max(ends), 401), partition.centres)
+        ends = (variable.low, variable.high) if variable.periodic else partition.centers
+        x = np.union1d(np.linspace(min(ends), max(ends), 401), partition.centers)
         strengths = partition.strengths(x)
         for i, part in enumerate(roles.values()):
             axes.plot(
@@ -188,7 +188,7 @@ def _draw_functions(explained: Explanation) -> Figure:
                 **figures.look(i),
                 marker=figures.marker(i),
                 markersize=3,
-                markevery=np.searchsorted(x, partition.centres).tolist(),
+                markevery=np.searchsorted(x, partition.centers).tolist(),
             )
         unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
         axes.set_title(f"{variable.name}{unit}, {percent(shares[j])}", loc="left")

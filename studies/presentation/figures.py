@@ -1,5 +1,6 @@
 """Style of all figures, and writing of figures to files."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -15,6 +17,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from numpy.typing import ArrayLike
 
 from ...core.fonts import cover_text
+from ...core.numerics import FloatArray
 from ..results.aggregates import Aggregates
 from ..results.analysis import Figures
 from ..results.differences import Difference
@@ -24,7 +27,7 @@ from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colors distinct to color-blind readers (Okabe and Ito 2008), without the palest."""
 STYLES = (
     "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1.5, 1, 1.5, 1, 1.5)),
@@ -33,6 +36,8 @@ STYLES = (
 """Line styles, one for each color, because most colors are the same gray on paper."""
 MARKERS = "osD^vPX"
 """Markers of points, one for each color."""
+MAX_STEM = 100
+"""Maximum number of characters of the name of a file, without numbers and the suffix."""
 IN_ROW = 0.2
 """Distance between the points of one row of a chart [rows]."""
 SETTINGS: dict[str, Any] = {
@@ -93,8 +98,8 @@ def grid(
 
 def look(index: int) -> dict[str, Any]:
     """Return color and dashes of a line."""
-    cycle = index // len(COLOURS)  # a colour that comes again has other dashes
-    return {"color": COLOURS[index % len(COLOURS)], "ls": STYLES[(index + cycle) % len(STYLES)]}
+    cycle = index // len(COLORS)  # a color that comes again has other dashes
+    return {"color": COLORS[index % len(COLORS)], "ls": STYLES[(index + cycle) % len(STYLES)]}
 
 
 def marker(index: int) -> str:
@@ -105,11 +110,16 @@ def marker(index: int) -> str:
 def draw_curve(
     axes: Axes, x: ArrayLike, estimate: Estimate, index: int, *, alpha: float = 0.12, **kwargs: Any
 ) -> None:
-    """Draw estimates ``(n,)`` over `x` as a line with a band of intervals."""
-    axes.fill_between(
-        np.asarray(x), estimate.low, estimate.high, color=look(index)["color"], alpha=alpha, lw=0
-    )
-    axes.plot(np.asarray(x), estimate.value, **look(index), lw=1.6, **kwargs)
+    """Draw estimates ``(n,)`` over `x` as a line with a band of intervals.
+
+    The edges of the band have the dashes of the line, which tell bands apart where they overlap.
+    """
+    places = np.asarray(x)
+    style = look(index)
+    axes.fill_between(places, estimate.low, estimate.high, color=style["color"], alpha=alpha, lw=0)
+    for edge in (estimate.low, estimate.high):
+        axes.plot(places, edge, **style, lw=0.6, alpha=0.7)
+    axes.plot(places, estimate.value, **style, lw=1.6, **kwargs)
 
 
 def draw_row(
@@ -154,7 +164,7 @@ def handle(label: str, **kwargs: Any) -> Line2D:
     return Line2D([], [], label=label, **kwargs)
 
 
-def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols: int = 4) -> None:
+def add_legend(figure: Figure, handles: Sequence[Artist], title: str = "", ncols: int = 4) -> None:
     """Add a legend above the panels."""
     figure.legend(
         handles=handles, title=title or None, loc="outside upper center", ncols=ncols,
@@ -181,10 +191,27 @@ def save(
 
     `formats` are suffixes without a dot.
     """
-    paths = [folder / f"{name}.{suffix}" for name in figures for suffix in formats]
-    for path in paths:
-        write(figures[path.stem], path)
+    paths = []
+    for stem, figure in zip(file_stems(figures), figures.values(), strict=True):
+        for suffix in formats:
+            paths.append(folder / f"{stem}.{suffix}")
+            write(figure, paths[-1])
     return paths
+
+
+def file_stems(names: Iterable[str]) -> list[str]:
+    """Return distinct names of files, without suffixes, spaces, commas and slashes.
+
+    >>> file_stems(["transient, topology=chain", "a/b", "a b"])
+    ['transient-topology=chain', 'a-b', 'a-b-2']
+    """
+    stems: list[str] = []
+    for name in names:
+        stem = re.sub(r"[^\w.=+-]+", "-", name)[:MAX_STEM].strip("-.") or "figure"
+        while stem in stems:
+            stem = f"{stem}-2"
+        stems.append(stem)
+    return stems
 
 
 def write(figure: Figure, path: Path) -> None:
@@ -238,12 +265,17 @@ def style(index: int) -> dict[str, Any]:
     return look(index) | {"marker": marker(index), "markersize": 4, "linewidth": 1.2}
 
 
+def beside_each_other(sizes: ArrayLike, index: int, lines: int) -> FloatArray:
+    """Return sizes, shifted a little for line `index` of several lines."""
+    shift: float = 2.0 ** (APART * (index - (lines - 1) / 2))
+    return shift * np.asarray(sizes, dtype=float)
+
+
 def draw_line(
     axes: Axes, sizes: Sequence[int], estimates: Sequence[Estimate], index: int, lines: int
 ) -> None:
     """Draw line `index` of several lines with intervals, shifted a little from the others."""
-    beside = 2.0 ** (APART * (index - (lines - 1) / 2))
-    places = [beside * n for n in sizes]
+    places = beside_each_other(sizes, index, lines)
     all_of_them = stack_estimates(estimates)
     axes.vlines(places, all_of_them.low, all_of_them.high, color=look(index)["color"], lw=1.2)
     axes.plot(places, all_of_them.value, **style(index))
@@ -257,10 +289,13 @@ def scale_axis(axes: Axes, sizes: Sequence[int]) -> None:
     axes.grid(alpha=0.25)
 
 
-def name_lines(figure: Figure, labels: Sequence[str], title: str) -> None:
-    """Add a legend of lines above the panels, with as many columns as fit."""
-    handles = [handle(label, **style(i)) for i, label in enumerate(labels)]
-    room = int(CHARACTERS * figure.get_figwidth() // (max(map(len, labels)) + 6))
+def name_lines(
+    figure: Figure, labels: Sequence[str], title: str, others: Sequence[Line2D] = ()
+) -> None:
+    """Add a legend of lines, and other entries, above the panels with as many columns as fit."""
+    handles = [*(handle(label, **style(i)) for i, label in enumerate(labels)), *others]
+    longest = max(len(str(entry.get_label())) for entry in handles)
+    room = int(CHARACTERS * figure.get_figwidth() // (longest + 6))
     add_legend(figure, handles, title, ncols=max(1, min(4, room)))
 
 
@@ -296,10 +331,10 @@ def draw_forest(
     for axes, (title, lines) in zip(all_axes[0], compared.items(), strict=True):
         axes.axvline(null, color="#888888", linewidth=0.8)
         for line in lines:
-            colour = COLOURS[0] if line.estimate.value >= null else COLOURS[1]
-            face = colour if line.p < LEVEL else "white"
+            color = COLORS[0] if line.estimate.value >= null else COLORS[1]
+            face = color if line.p < LEVEL else "white"
             row = names.index(line.condition)
-            draw_row(axes, row, line.estimate, color=colour, markerfacecolor=face, markersize=5)
+            draw_row(axes, row, line.estimate, color=color, markerfacecolor=face, markersize=5)
         axes.grid(axis="x", alpha=0.25)
         axes.set_title(title, loc="left")
         axes.set_xlabel(unit)
@@ -313,8 +348,8 @@ def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
     handles = [
         handle("significantly different (adjusted p < 0.05)", **point),
         handle("no significant difference", **point, markerfacecolor="white"),
-        handle("higher than the reference", color=COLOURS[0], linewidth=1.5),
-        handle("lower than the reference", color=COLOURS[1], linewidth=1.5),
+        handle("higher than the reference", color=COLORS[0], linewidth=1.5),
+        handle("lower than the reference", color=COLORS[1], linewidth=1.5),
     ]
     seeds = count_seeds(line.seeds for line in lines)
     add_legend(figure, handles, f"means over {seeds} seeds, bars: 95% intervals", ncols=2)

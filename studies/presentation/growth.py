@@ -1,23 +1,28 @@
 """The figure of laws of growth: what was measured, the law, and what it predicts."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import SpecError
-from ..results.laws import Law
+from ..laws.fitting import Law
+from ..laws.samples import LOGIT
+from ..laws.scaling import ScalingLaw, scaling_law
 from ..results.results import Results
-from ..results.samples import LOGIT
-from ..results.scaling_law import ScalingLaw, scaling_law
+from ..results.statistics import stack_estimates
 from . import figures
 
 POINTS = 60
 """Points of a curve."""
+MARGIN = 2.0
+"""Factor by which a logarithmic axis extends beyond what was measured and the laws."""
 BEYOND = 2.0
 """Factor by which a curve extends beyond the largest size if no size is predicted."""
 
-REPORTED = {"success": "growth of success", "decision_median": "growth of the time of a decision"}
+REPORTED = {"success": "growth-of-success", "decision_median": "growth-of-the-time-of-a-decision"}
 """Names of the figures of laws in a report, by measure."""
 
 
@@ -35,38 +40,51 @@ def growth_figures(results: Results) -> dict[str, Figure]:
 def draw_laws(analysis: ScalingLaw) -> Figure:
     """Return the figure: seeds are points, lines laws, bands 90% predictions of their mean.
 
-    Sizes that were not run are left of the band's end beyond the dotted line.
+    The axis shows what was measured and the laws, even if a band extends further.
     """
     known = [(f.group or analysis.title, f.law) for f in analysis.fits if f.law is not None]
-    figure, panels = figures.panels(1, 1, (5.4, 3.6))
-    axes = panels[0, 0]
     sizes = sorted({float(n) for _, law in known for n in law.sample.sizes})
     last = max([BEYOND * sizes[-1], *analysis.predicted]) if sizes else 1.0
-    for index, (_, law) in enumerate(known):
-        _draw(figure, index, law, last)
-    if known:
-        is_rate = known[0][1].sample.scale is LOGIT
-        figures.scale_axis(axes, [round(n) for n in (*sizes, last)])
-        if is_rate:
-            figures.as_rates(axes)
-        else:
-            figures.log_axis(axes)
-        axes.axvline(sizes[-1], color="#888888", linewidth=0.8, ls=":")
-        figures.name_lines(figure, [group for group, _ in known], "bands: 90% of new means")
-    axes.set_title(analysis.title, loc="left")
-    axes.set_xlabel(analysis.size)
-    return figure
+    with figures.apply_style():
+        figure, panels = figures.panels(1, 1, (5.0, 3.8))
+        axes = panels[0, 0]
+        for index, (_, law) in enumerate(known):
+            _draw(axes, law, index, len(known), last)
+        if known:
+            figures.scale_axis(axes, [round(n) for n in (*sizes, last)])
+            _limit(axes, [law for _, law in known], last)
+            largest = {"color": "#555555", "lw": 1.0, "ls": ":"}
+            axes.axvline(sizes[-1], **largest)
+            entry = figures.handle("largest size that was run", **largest)
+            title = "points: seeds; lines: laws; bands: 90% predictions of a mean"
+            figures.name_lines(figure, [group for group, _ in known], title, [entry])
+        axes.set_title(analysis.title, loc="left")
+        axes.set_xlabel(analysis.size)
+    return figures.spell_dollars(figure, [group for group, _ in known])
 
 
-def _draw(figure: Figure, index: int, law: Law, last: float) -> None:
-    (axes,) = figure.axes
-    colour = figures.look(index)["color"]
-    measured = law.sample.observed
-    places = np.broadcast_to(law.sample.sizes, measured.shape)
-    axes.scatter(places, measured, s=6, alpha=0.35, color=colour, linewidths=0)
-    line = np.geomspace(law.sample.sizes[0], last, POINTS)
-    predicted = [law.predict(float(n)) for n in line]
-    axes.plot(line, law.curve_at(line), color=colour, lw=1.4)
-    low = [float(e.low) for e in predicted]
-    high = [float(e.high) for e in predicted]
-    axes.fill_between(line, low, high, color=colour, alpha=0.15, linewidth=0)
+def _draw(axes: Axes, law: Law, index: int, lines: int, last: float) -> None:
+    """Draw what was measured in one group, its law, and the predictions of the law."""
+    sample = law.sample
+    places = figures.beside_each_other(sample.sizes, index, lines)
+    color = figures.look(index)["color"]
+    axes.scatter(
+        np.broadcast_to(places, sample.observed.shape), sample.observed, s=24, alpha=0.8,
+        marker=figures.marker(index), color=color, edgecolor="white", linewidths=0.6, zorder=3,
+    )  # fmt: skip
+    line = np.geomspace(sample.sizes[0], last, POINTS)
+    predicted = stack_estimates([law.predict(float(n)) for n in line])
+    figures.draw_curve(axes, line, predicted._replace(value=law.curve_at(line)), index)
+
+
+def _limit(axes: Axes, laws: Sequence[Law], last: float) -> None:
+    """Scale the vertical axis to what was measured and to the laws."""
+    if laws[0].sample.scale is LOGIT:
+        figures.as_rates(axes)
+        return
+    shown = [law.sample.observed for law in laws] + [law.curve_at(np.array([last])) for law in laws]
+    values = np.concatenate([array.ravel() for array in shown])
+    positive = values[values > 0.0]
+    if positive.size:
+        axes.set_ylim(positive.min() / MARGIN, positive.max() * MARGIN)
+    figures.log_axis(axes)

@@ -215,8 +215,8 @@ class SummaryTable:
     def remark(self) -> str:
         """Remark on the intervals."""
         if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return "Intervals: of rates Wilson's, else by bootstrap (short if values are skewed)."
-        return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
+            return "Intervals: Wilson's for rates, else bootstrap (too short for skewed values)."
+        return f"Fewer than {FEW} seeds: Wilson's intervals for rates, else Student's intervals."
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:

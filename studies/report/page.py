@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from ...core.plugins.words import show
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
+from ..laws.size_axis import columns_of
 from ..presentation.growth import growth_figures
 from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
@@ -23,7 +24,6 @@ from ..results.analysis import Analysis, identity_lines
 from ..results.comparison import compare_conditions, missing_reference
 from ..results.notation import whole
 from ..results.results import Results, read
-from ..results.scaling_law import columns_of
 from ..scalability.report import ScalabilityReport, analyze
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import control_lines

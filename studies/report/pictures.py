@@ -3,13 +3,15 @@
 import base64
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import islice
 from typing import NamedTuple
 
 from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox, BboxBase
 
 from ...core.fonts import cover_text
 from ...topologies.drawing import picture
@@ -25,6 +27,17 @@ MAX_AGENTS = 64
 """Maximum number of agents of a hierarchy that is drawn."""
 PANEL_MARGIN = 4.0
 """Margin around a panel that is shown on its own [pt]."""
+TICK = 5.0
+"""Width of the ticks of a vertical axis [pt]."""
+
+
+class Crop(NamedTuple):
+    """A part of a figure that narrow screens show on its own: parts side by side [pt]."""
+
+    width: float
+    height: float
+    parts: tuple[tuple[float, str], ...]
+    """Distance of each part from the left edge, and its view box in the figure."""
 
 
 class Picture(NamedTuple):
@@ -38,8 +51,8 @@ class Picture(NamedTuple):
     """The same figure as PDF, in base64."""
     prefix: str
     """Prefix of the ids in the SVG element."""
-    panels: tuple[str, ...]
-    """View boxes of the panels and of the legend, which narrow screens stack; empty for one."""
+    panels: tuple[Crop, ...]
+    """The panels and the legend, which narrow screens stack; empty for one panel."""
 
     @property
     def title(self) -> str:
@@ -60,27 +73,50 @@ def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Pict
             pdf = io.BytesIO()
             figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
             encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            drawings.append(Picture(name, Markup(text), encoded, name_space, panel_boxes(figure)))
+            drawings.append(Picture(name, Markup(text), encoded, name_space, crops_of(figure)))
     return drawings
 
 
-def panel_boxes(figure: Figure) -> tuple[str, ...]:
-    """Return the SVG view boxes ``x y width height`` of a figure's panels and legends [pt]."""
+def crops_of(figure: Figure) -> tuple[Crop, ...]:
+    """Return the legends and the panels of a figure.
+
+    A panel that shares the vertical axis of the first panel in its row is shown beside that axis.
+    """
     panels = [axes for axes in figure.axes if axes.get_visible()]
     if len(panels) < 2:
         return ()
+    crops = [_crop(figure, [legend.get_window_extent()]) for legend in figure.legends]
+    for axes in panels:
+        own = _extent(axes).padded(PANEL_MARGIN * figure.dpi / 72.0)
+        row = [
+            sibling
+            for sibling in axes.get_shared_y_axes().get_siblings(axes)
+            if sibling.bbox.y0 == axes.bbox.y0
+        ]
+        first = min(row, key=lambda sibling: sibling.bbox.x0)
+        left = _extent(first).x0 - PANEL_MARGIN * figure.dpi / 72.0
+        ticks = TICK * figure.dpi / 72.0
+        axis = Bbox.from_extents(left, own.y0, first.bbox.x0 - ticks, own.y1)
+        panel = Bbox.from_extents(axes.bbox.x0 - ticks, own.y0, own.x1, own.y1)
+        crops.append(_crop(figure, [own] if first is axes else [axis, panel]))
+    return tuple(crops)
+
+
+def _extent(axes: Axes) -> BboxBase:
+    """Return the box of a panel with its labels [pixels]."""
+    return axes.get_tightbbox() or axes.bbox
+
+
+def _crop(figure: Figure, boxes: Sequence[BboxBase]) -> Crop:
+    """Return parts of a figure side by side; boxes have a common height [pixels]."""
     scale = 72.0 / figure.dpi
-    height = figure.bbox.height * scale
-    boxes = []
-    for artist in (*figure.legends, *panels):
-        box = artist.get_tightbbox()
-        if box is not None and box.width > 1.0:
-            margin = PANEL_MARGIN if artist in panels else 0.0
-            x = box.x0 * scale - margin
-            y = height - box.y1 * scale - margin
-            sizes = (side * scale + 2 * margin for side in (box.width, box.height))
-            boxes.append(" ".join(f"{value:.1f}" for value in (x, y, *sizes)))
-    return tuple(boxes)
+    parts = []
+    x = 0.0
+    for box in boxes:
+        places = (box.x0, figure.bbox.height - box.y1, box.width, box.height)
+        parts.append((round(x, 1), " ".join(f"{scale * value:.1f}" for value in places)))
+        x += scale * box.width
+    return Crop(round(x, 1), round(scale * boxes[0].height, 1), tuple(parts))
 
 
 def embed(svg: str, prefix: str) -> str:

@@ -121,7 +121,7 @@ def replays(
             episode = {
                 "condition": trial.condition,
                 "seed": trial.seed,
-                "number": number + 1,
+                "number": number,
                 "reached": reached[trial.condition, trial.seed, number],
                 "scene": scenes.index(scene),
                 **player.pack(recording, scene),

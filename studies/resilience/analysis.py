@@ -23,6 +23,12 @@ from .losses import LosableTeam
 
 HALF = 0.5
 """Share of the intact performance at which the number of losses stops growing."""
+VERDICTS = {
+    "yes": "the team tolerates any single loss",
+    "no": "the team does not tolerate every single loss",
+    "undecided": "it is undecided whether the team tolerates any single loss",
+}
+"""Verdicts of `Resilience.verdict` in words."""
 
 
 @dataclass
@@ -80,6 +86,8 @@ class Resilience:
     tolerance: float
     """Share of the intact performance that a tolerated loss may cost."""
     teams: tuple[TeamLosses, ...]
+    left_out: tuple[str, ...] = ()
+    """Conditions with an intact performance of 0 or below, of which losses say nothing."""
 
     @cached_property
     def single(self) -> Mapping[str, tuple[Difference, ...]]:
@@ -204,7 +212,7 @@ class Resilience:
             return
         place = own.team.positions[own.team.units.index(worst.condition)]
         yield (
-            f"{own.condition}: the team tolerates any single loss: {self.verdict(own)}. The worst "
+            f"{own.condition}: {VERDICTS[self.verdict(own)]}. The worst "
             f"is that of {worst.condition} ({place}), which changes {self.title} by "
             f"{format_estimate(worst.estimate, signed=True)}."
         )
@@ -215,16 +223,30 @@ class Resilience:
             yield f"Performance does not halve with up to {largest} of {n} lost."
         else:
             value = format_estimate(mean_estimate(self.measure, own.joined(own.by_number[halving])))
-            yield f"Performance is at most half with {halving} of {n} lost: {value}."
+            yield (
+                f"With {halving} of {n} lost, {self.title} is at most half of its intact value: "
+                f"{value}."
+            )
 
     @property
     def legend(self) -> tuple[str, ...]:
-        """Sentences on what was lost and what counts as tolerated."""
+        """Sentences on what was lost, what counts as tolerated, and what was left out."""
         share = format_number(100.0 * self.tolerance)
-        return (
+        text = (
             f"Fault: {self.fault}, from the first step on; teams are not trained again. A loss is "
             f"tolerated if it costs at most {share}% of the intact performance. Changes are paired "
-            "by seed, on the same initial states.",
+            "by seed, on the same initial states."
+        )
+        return (text, self.remark) if self.remark else (text,)
+
+    @property
+    def remark(self) -> str:
+        """Sentence that names the conditions that were left out; empty if there are none."""
+        if not self.left_out:
+            return ""
+        return (
+            f"Left out, because {self.title} of their intact teams is 0 or below: "
+            f"{'; '.join(self.left_out)}."
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -234,6 +256,7 @@ class Resilience:
             "measure": self.measure.name,
             "tolerance": self.tolerance,
             "teams": [self._team_to_dict(own) for own in self.teams],
+            "left_out": list(self.left_out),
             "comparison": [
                 {
                     "condition": d.condition,

@@ -81,6 +81,8 @@ class ComparisonTable(NamedTuple):
         left_out = "; ".join(text for group in self.groups for text in group.left_out)
         if left_out:
             lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
+        if self.measure.name in RECOVERY:
+            lines += self._without_success()
         compared = {c for group in self.groups for c in group.members.values()}
         others = [c for c in self.results.conditions if c not in compared]
         if others:
@@ -90,6 +92,22 @@ class ComparisonTable(NamedTuple):
         if self.measure.name == SUCCESS.name and not any(own.any() for own in values):
             lines += wrapped(f"No run has any {self.title}.")
         return (*(lines or [NOTHING]), *identity_lines(self.results.identical))
+
+    def _without_success(self) -> list[str]:
+        """Return how many seeds of each condition had no success before the failure, in lines."""
+        counts = {
+            label: (len(group.values[name]), len(self.results.seeds(label)))
+            for group in self.groups
+            for name, label in group.members.items()
+        }
+        texts = [
+            f"{condition}, {total - known} of {total}"
+            for condition, (known, total) in counts.items()
+            if known < total
+        ]
+        if not texts:
+            return []
+        return wrapped(f"Seeds without success before the failure, left out: {'; '.join(texts)}.")
 
 
 def title_of(measure: Measure, phase: str) -> str:

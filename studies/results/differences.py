@@ -11,7 +11,16 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from .notation import format_estimate, format_p
 from .permutation_tests import holm, independent_permutation, paired_permutation
-from .statistics import Array, Estimate, bootstrap, exactly, probability_higher, rate, welch
+from .statistics import (
+    Array,
+    Estimate,
+    bootstrap,
+    cliffs_delta,
+    exactly,
+    probability_higher,
+    rate,
+    welch,
+)
 
 
 @dataclass(frozen=True)
@@ -56,9 +65,8 @@ class Difference:
 
     @property
     def cliffs_delta(self) -> float:
-        """Cliff's delta (1993): probability of a higher value minus that of a lower one."""
-        own, base = self.values
-        return float(np.sign(np.subtract.outer(own, base)).mean())
+        """Cliff's delta: probability of a higher value minus that of a lower one."""
+        return cliffs_delta(*self.values)
 
 
 MIN_RUNS = 2

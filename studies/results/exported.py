@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 from ...core.interface.measures import NO_SUCCESS, RETURN, SUCCESS, Measure
 from ...core.numerics import pd
+from ...core.plugins.words import show
 from ..spec.tables import SpecTable
 from .foreign import score_kind
 from .long_form import KEYS, pack, plain_levels, refuse_repeated, whole_names
 from .results import DONE, TRIAL_COLUMNS, Results, assemble
-from .score_files import ScoreTable
+from .score_files import NUMBER, ScoreTable
 from .spreadsheet import harmless
 
 EPISODES = ("condition", "seed", "phase", "episode", "steps")
@@ -125,10 +126,35 @@ def _conditions(
             row = int(strange.argmax())
             allowed = "a condition of study.json in its folder"
             raise table.refusal(row, "condition", labels[row], allowed)
-        return known.conditions, labels.map(written)
+        labels = labels.map(written)
+        _check_levels(table, labels, swept, known.conditions)
+        return known.conditions, labels
     levels = pd.DataFrame({key: plain_levels(table.text(key)) for key in swept}, labels.index)
     rows = levels.assign(condition=labels).drop_duplicates("condition").to_dict("records")
     return {row.pop("condition"): row for row in rows}, labels
+
+
+def _check_levels(
+    table: ScoreTable,
+    labels: pd.Series,
+    swept: Sequence[str],
+    conditions: Mapping[str, SpecTable],
+) -> None:
+    """Refuse a swept value that is not the one that study.json has for the row's condition."""
+    for key in swept:
+        cells = pd.DataFrame({"condition": labels, "cell": table.text(key)}).drop_duplicates()
+        for row, condition, cell in cells.itertuples():
+            value = conditions[condition].get(key, "")
+            if isinstance(value, str | int | float) and not _is_spelled(cell, value):
+                allowed = f"{show(value)}, the value of condition {condition!r} in study.json"
+                raise table.refusal(row, key, cell, allowed)
+
+
+def _is_spelled(cell: str, value: float | str) -> bool:
+    """Return whether a cell is a swept value, as one of the exported forms writes it."""
+    if NUMBER.fullmatch(cell) and not isinstance(value, str):
+        return float(cell) == value
+    return cell in (value, str(harmless(value)), str(value).lower())
 
 
 def _whole(table: ScoreTable, column: str) -> pd.Series:

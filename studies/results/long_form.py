@@ -128,8 +128,15 @@ def refuse_repeated(
         return
     row = int(repeated.argmax())
     first = int((frame[keys] == frame[keys].iloc[row]).all(axis=1).to_numpy().argmax())
-    named = ", ".join(f"{name} = {frame[k].iloc[row]!r}" for k, name in columns.items() if name)
+    named = ", ".join(
+        f"{name} = {_shown(frame[k].iloc[row])}" for k, name in columns.items() if name
+    )
     raise SpecError(f"{table.place(row)}: {named}: stands in {table.place(first)}, too{hint}")
+
+
+def _shown(name: object) -> str:
+    """Return a name, text in quotes."""
+    return repr(name) if isinstance(name, str) else f"{name}"
 
 
 def _phase_key(phase: str) -> tuple[int, str]:

@@ -1,7 +1,8 @@
-"""Recovery from failures, seed by seed: what is lost, and after how long it is back.
+"""Recovery from failures, seed by seed: how much success is lost, and how soon it is back.
 
 The level of a seed is its mean over the last `BLOCK` episodes before the first failure. All
-measures count from that failure on.
+measures count from that failure on. A seed without any success before the failure has nothing to
+lose or to recover, so that it has no measures.
 """
 
 from collections.abc import Iterable, Mapping
@@ -12,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.interface.measures import SUCCESS, Measure
-from ...core.numerics import pd
+from ...core.numerics import BoolArray, pd
+from ..errors import SpecError
 from .results import STEPS, Results
 from .statistics import Array
 
@@ -28,22 +30,25 @@ RECOVERY = {measure.name: measure for measure in (RECOVERED, LOSS, TIME, DECISIO
 """Measures of a trial with a failure, by name."""
 
 
-def recovery(shortfall: ArrayLike, allowed: ArrayLike) -> tuple[Array, Array]:
-    """Return per seed whether it recovered from a fault, and after how many episodes.
+def recovery(shortfall: ArrayLike, allowed: ArrayLike, last_onset: int = 0) -> tuple[Array, Array]:
+    """Return per seed whether it recovered from faults, and after how many episodes.
 
     A seed recovers at the first episode from which on `BLOCK` episodes fall short by no more than
-    is allowed, in the mean. A seed that never recovers counts with all its episodes, which is a
-    lower bound.
+    is allowed, in the mean, and all faults have begun. A seed that never recovers counts with all
+    its episodes, which is a lower bound.
 
     Parameters
     ----------
     shortfall
-        Loss of each episode from the fault on ``(n_seeds, n_episodes)``.
+        Loss of each episode from the first fault on ``(n_seeds, n_episodes)``.
     allowed
         Loss at which a seed counts as recovered: a number, or ``(n_seeds, 1)``.
+    last_onset
+        Number of episodes between the first fault and the last.
     """
     blocks = np.lib.stride_tricks.sliding_window_view(np.asarray(shortfall), BLOCK, axis=1)
     regained = blocks.mean(axis=2) <= np.asarray(allowed) + 1e-12
+    regained[:, :last_onset] = False
     recovered = regained.any(axis=1)
     episodes = np.where(recovered, regained.argmax(axis=1), np.shape(shortfall)[1])
     return recovered.astype(float), episodes.astype(float)
@@ -52,14 +57,24 @@ def recovery(shortfall: ArrayLike, allowed: ArrayLike) -> tuple[Array, Array]:
 class FailureCourse(NamedTuple):
     """Training of one condition through a failure."""
 
-    onset: int
-    """Episode in which the first failure begins."""
+    onsets: tuple[int, ...]
+    """Episodes in which failures begin, sorted."""
     success: Array
     """``(n_seeds, n_episodes)`` from the first episode of training on."""
     steps: Array
     """``(n_seeds, n_episodes)``"""
     seeds: tuple[int, ...]
     """Seeds of the rows."""
+
+    @property
+    def onset(self) -> int:
+        """Episode in which the first failure begins."""
+        return self.onsets[0]
+
+    @property
+    def had_success(self) -> BoolArray:
+        """Whether each seed succeeded before the failure, ``(n_seeds,)``."""
+        return np.asarray(self.before.any(axis=1))
 
     @property
     def before(self) -> Array:
@@ -77,28 +92,31 @@ class FailureCourse(NamedTuple):
 
     @property
     def measured(self) -> dict[str, Array]:
-        """Values ``(n_seeds,)`` of the measures `RECOVERY`, by name."""
+        """Values ``(n_seeds,)`` of the measures `RECOVERY` by name; NaN without success before."""
         level = self.before.mean(axis=1, keepdims=True)
         shortfall = level - self.success[:, self.onset :]
-        recovered, episodes = recovery(shortfall, (1.0 - REGAINED) * level)
+        last_onset = self.onsets[-1] - self.onset
+        recovered, episodes = recovery(shortfall, (1.0 - REGAINED) * level, last_onset)
         decisions = [
             run[self.onset : self.onset + int(count)].sum()
             for run, count in zip(self.steps, episodes, strict=True)
         ]
         values = (recovered, shortfall.sum(axis=1), episodes, np.array(decisions, dtype=float))
-        return dict(zip(RECOVERY, values, strict=True))
+        known = (np.where(self.had_success, own, np.nan) for own in values)
+        return dict(zip(RECOVERY, known, strict=True))
 
 
 def failure_course(results: Results, condition: str, phase: str = "training") -> FailureCourse:
     """Return the course of a condition; in the phase `KEPT` that of the copied team."""
-    onset = int(results.numbers(condition)["onset"][0])
+    numbers = results.numbers(condition)
+    onsets = sorted(int(numbers[name][0]) for name in numbers if name.startswith("onset"))
     success, steps = (
         results.values(condition, name).astype(float) for name in (SUCCESS.name, STEPS.name)
     )
     if phase != "training":
-        success[:, onset:] = results.values(condition, SUCCESS.name, phase)
-        steps[:, onset:] = results.values(condition, STEPS.name, phase)
-    return FailureCourse(onset, success, steps, results.seeds(condition))
+        success[:, onsets[0] :] = results.values(condition, SUCCESS.name, phase)
+        steps[:, onsets[0] :] = results.values(condition, STEPS.name, phase)
+    return FailureCourse(tuple(onsets), success, steps, results.seeds(condition))
 
 
 def bounded(name: str, courses: Iterable[FailureCourse], longest: int | None) -> Measure:
@@ -119,7 +137,9 @@ def bounded(name: str, courses: Iterable[FailureCourse], longest: int | None) ->
 def recovery_by_seed(
     results: Results, name: str, phase: str
 ) -> tuple[Measure, Mapping[str, pd.Series]]:
-    """Return a measure of `RECOVERY` and its values by condition, of those in which failures began.
+    """Return a measure of `RECOVERY` and its values by condition.
+
+    Left out are conditions without failures, and seeds without success before them.
 
     Parameters
     ----------
@@ -129,6 +149,11 @@ def recovery_by_seed(
         Name of the measure.
     phase
         ``training``, or `KEPT`.
+
+    Raises
+    ------
+    SpecError
+        If no seed had success before a failure.
     """
     courses = {
         condition: failure_course(results, condition, phase)
@@ -138,4 +163,8 @@ def recovery_by_seed(
     measure = bounded(name, courses.values(), results.step_limits.training)
     if phase != "training":
         measure = replace(measure, title=f"{measure.title}, {phase}")
-    return measure, {c: pd.Series(own.measured[name], own.seeds) for c, own in courses.items()}
+    values = {c: pd.Series(own.measured[name], own.seeds).dropna() for c, own in courses.items()}
+    known = {condition: own for condition, own in values.items() if len(own)}
+    if not known:
+        raise SpecError(f"measure = {name!r}: no seed succeeded before a failure began")
+    return measure, known

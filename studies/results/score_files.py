@@ -99,7 +99,7 @@ class ScoreTable(NamedTuple):
         Raises
         ------
         SpecError
-            If a score is no finite number.
+            If a score is no finite number, or truth values stand among other numbers.
         """
         cells = self.frame[column].tolist()
         values = np.array([score_value(cell) for cell in cells], dtype=float)
@@ -107,6 +107,10 @@ class ScoreTable(NamedTuple):
         if wrong.any():
             row = int(wrong.argmax())
             raise self.refusal(row, column, cells[row], SCORE_ALLOWED)
+        truths = np.array([is_truth(cell) for cell in cells])
+        if truths.any() and not np.isin(values[~np.isnan(values)], (0.0, 1.0)).all():
+            row = int(truths.argmax())
+            raise self.refusal(row, column, cells[row], "a number, as other scores are")
         return pd.Series(values)
 
 
@@ -119,6 +123,13 @@ class JsonNumber(str):
     """A number of a JSON file, as it is written."""
 
     __slots__ = ()
+
+
+def is_truth(cell: object) -> bool:
+    """Return whether a cell is a truth value, or the text of one."""
+    if isinstance(cell, str):
+        return cell.strip().lower() in TRUTHS
+    return isinstance(cell, bool | np.bool_)
 
 
 def is_blank(cell: object) -> bool:

@@ -9,6 +9,8 @@ from functools import cached_property
 from itertools import permutations
 from typing import NamedTuple
 
+from ..laws.inference import sign_change
+from ..laws.universal import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
 from ..results.analysis import Summary
 from ..results.notation import format_estimate, format_number
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
@@ -21,8 +23,6 @@ from .fronts import (
     parse_budget,
     probability_of_best,
 )
-from .inference import sign_change
-from .laws import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
 
 LIKELY = 0.5
 """Probability above which a sentence names a best size or a member of a front."""
@@ -148,8 +148,9 @@ class Scalability:
         lines = []
         for name, law in self.laws.items():
             estimates = {"contention": law.contention, "coherency": law.coherency}
-            if law.is_plausible:
-                estimates[f"best number of {self.data.size}"] = law.best_size
+            best = law.best_size_within(self.data.sizes(name)[-1])
+            if best is not None:
+                estimates[f"best number of {self.data.size}"] = best
             seeds = len(self.data.performances[name, self.data.sizes(name)[0]])
             lines.append(Summary(name, seeds, estimates))
         return tuple(lines)
@@ -268,12 +269,14 @@ class Scalability:
 
     def _law_to_dict(self, hierarchy: str) -> dict[str, object]:
         law = self.laws[hierarchy]
+        largest = self.data.sizes(hierarchy)[-1]
+        best = law.best_size_within(largest)
         return {
             "contention": law.contention.to_json(),
             "coherency": law.coherency.to_json(),
             "describes_times": law.is_plausible,
-            "best_size": law.best_size.to_json() if law.is_plausible else None,
-            "sentence": _place(law, self.data.sizes(hierarchy)[-1], self.data.size),
+            "best_size": None if best is None else best.to_json(),
+            "sentence": _place(law, largest, self.data.size),
         }
 
 
@@ -295,7 +298,10 @@ def _place(law: UniversalLaw, largest: float, size: str) -> str:
             f"{math.floor(low)} {size}"
         )
     if math.isinf(high):
-        return f"the throughput is at its maximum from {math.floor(low)} {size} on, no upper bound"
+        return (
+            f"the throughput is at its maximum with {math.floor(low)} {size} or more; these seeds "
+            "give no upper bound"
+        )
     return f"the throughput is at its maximum with {format_estimate(law.best_size)} {size}"
 
 

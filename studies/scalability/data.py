@@ -12,13 +12,13 @@ from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
+from ..laws.scaling import decisions_to_criterion
+from ..laws.size_axis import SizeAxis, columns_of
+from ..laws.universal import Scaling, Times
 from ..results.analysis import estimate_of, estimate_over_seeds
 from ..results.comparison import title_of, values_of
 from ..results.results import Results
-from ..results.scaling_law import columns_of, decisions_to_criterion, size_key
 from ..results.statistics import Array, Estimate
-from ..spec.tables import label_but
-from .laws import Scaling, Times
 
 
 class Cost(NamedTuple):
@@ -30,6 +30,8 @@ class Cost(NamedTuple):
     """Heading in tables and figures."""
 
 
+ALL_TEAMS = "all teams"
+"""Name of the only hierarchy of a study that varies nothing but the size."""
 DECISIONS = "decisions"
 """Name of the cost of training: decisions until the criterion is reached."""
 COSTS = {
@@ -135,16 +137,12 @@ def collect(
     SpecError
         If there is no such measure or size, or only one size; one line.
     """
-    columns = columns_of(results)
-    key = size_key(columns, size)
-    places = {
-        condition: (label_but(own, [key]) or "all teams", float(str(own[key])))
-        for condition, own in columns.items()
-    }
+    axis = SizeAxis.of(columns_of(results), size)
+    places = {condition: (name or ALL_TEAMS, n) for condition, (name, n) in axis.places.items()}
     shown_as, values, phase = values_of(results, measure)
     performances = _cells(values, places)
     if len({n for _, n in performances}) < 2:
-        raise SpecError(f"size = {key!r}: one size; scalability needs two or more")
+        raise SpecError(f"size = {axis.key!r}: one size; scalability needs two or more")
     costs = {
         name: _measured(results, cost.number, None, places)
         for name, cost in COSTS.items()
@@ -155,7 +153,7 @@ def collect(
         counts = {c: own for c, (own, censored) in reached.items() if not censored.any()}
         costs[DECISIONS] = _cells(counts, places)
     return ScalabilityData(
-        size=key.rpartition(".")[2],
+        size=axis.name,
         scaling=scaling,
         performance=shown_as,
         performance_title=title_of(shown_as, phase),

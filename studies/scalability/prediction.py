@@ -1,6 +1,6 @@
 """Predictions for team sizes that were not run, and their comparison with later results.
 
-The laws and intervals are those of `nested_agents.studies.results.laws`. A prediction file holds
+The laws and intervals are those of `nested_agents.studies.laws`. A prediction file holds
 the spec of the study and a hash, so that a later change of the file is found.
 """
 
@@ -17,16 +17,17 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import SpecError
+from ..laws.scaling import scaling_law
+from ..laws.size_axis import SizeAxis, check_size, columns_of
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary, estimate_over_seeds
 from ..results.comparison import values_of
 from ..results.notation import format_estimate, format_number
 from ..results.results import Results
-from ..results.scaling_law import columns_of, scaling_law, size_key
 from ..results.statistics import Estimate
-from ..spec.tables import SpecTable, flat, label_but
+from ..spec.tables import SpecTable, flat
 from ..store import durable
-from .data import COSTS, TIME
+from .data import ALL_TEAMS, COSTS, TIME
 
 LEVEL = 0.9
 """Coverage of the intervals, for the mean of as many seeds as were fitted."""
@@ -112,10 +113,10 @@ def predict(
     SpecError
         If a size was run, or nothing has a law; one line.
     """
-    columns = columns_of(results)
-    key = size_key(columns, size)
-    run = {float(str(own[key])) for own in columns.values()}
+    axis = SizeAxis.of(columns_of(results), size)
+    run = {n for _, n in axis.places.values()}
     for n in sizes:
+        check_size("predict", n)
         if n in run:
             raise SpecError(f"predict = {n}: was run; name sizes that were not")
     numbers = [cost.number for cost in COSTS.values() if cost.number]
@@ -124,13 +125,13 @@ def predict(
     seeds: list[int] = []
     for name in dict.fromkeys((measure, TIME, *numbers)):
         try:
-            growth = scaling_law(results, name, size=key, predict=sizes)
+            growth = scaling_law(results, name, size=axis.key, predict=sizes)
         except SpecError:
             if name == measure:
                 raise
             continue  # was not measured
         for fitted in growth.fits:
-            hierarchy = fitted.group or "all teams"
+            hierarchy = fitted.group or ALL_TEAMS
             if fitted.law is None:
                 remarks.append(f"{hierarchy}: {growth.title} is not predicted: {fitted.why}.")
                 continue
@@ -141,7 +142,7 @@ def predict(
     if not predictions:
         raise SpecError(f"predict: no measure has a law; {' '.join(remarks)}")
     plain = json.loads(json.dumps(spec))
-    return PredictionFile(key, min(seeds), plain, tuple(predictions)), tuple(remarks)
+    return PredictionFile(axis.key, min(seeds), plain, tuple(predictions)), tuple(remarks)
 
 
 class CheckedPrediction(NamedTuple):
@@ -230,11 +231,10 @@ def check(file: PredictionFile, results: Results, spec: SpecTable) -> Prediction
         If the specs differ in another key, or no predicted size was measured; one line.
     """
     _check_spec(file, spec)
-    columns = columns_of(results)
+    swept = {c: own for c, own in columns_of(results).items() if file.size in own}
     condition_at = {
-        (label_but(own, [file.size]) or "all teams", float(str(own[file.size]))): condition
-        for condition, own in columns.items()
-        if file.size in own
+        (group or ALL_TEAMS, n): condition
+        for condition, (group, n) in SizeAxis.by(file.size, swept).places.items()
     }
     measured = {name: values_of(results, name) for name in {p.measure for p in file.predictions}}
     checked: list[CheckedPrediction] = []

@@ -9,22 +9,22 @@ from html import escape
 from typing import TYPE_CHECKING, get_args
 
 from ..errors import SpecError
+from ..laws.size_axis import SizeAxis, columns_of
+from ..laws.universal import Scaling
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
 from ..results.notation import wrapped
 from ..results.results import Results
-from ..results.scaling_law import columns_of, size_key
 from ..spec.conditions import ConditionSettings
 from .analysis import Scalability
 from .data import collect
-from .laws import Scaling
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ASSUMED = (
     "The scenario does not say whether its task grows with the team: strong scaling is assumed. "
-    "The option scaling sets it."
+    "Set it with --scaling strong or --scaling weak."
 )
 
 
@@ -117,13 +117,11 @@ def _scaling_of(
     results: Results, settings: Mapping[str, ConditionSettings], size: str | None
 ) -> Scaling | None:
     """Return whether the task grows with the team; None if the scenario does not say."""
-    columns = columns_of(results)
-    key = size_key(columns, size)
+    places = SizeAxis.of(columns_of(results), size).places
     sizes: dict[float, set[float | None]] = {}
     for condition, own in settings.items():
-        if condition in columns:
-            n = float(str(columns[condition][key]))
-            sizes.setdefault(n, set()).add(own.scenario.task_size)
+        if condition in places:
+            sizes.setdefault(places[condition][1], set()).add(own.scenario.task_size)
     known: Sequence[float | None] = [part for each in sizes.values() for part in each]
     if not known or None in known:
         return None

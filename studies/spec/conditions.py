@@ -45,6 +45,8 @@ Length = Annotated[int, Field(ge=1, le=1_000_000)]
 def _printable(name: str) -> str:
     if not name.strip() or not name.isprintable():
         raise ValueError("must be a name that can be printed")
+    if name != name.strip():
+        raise ValueError("must not begin or end with a blank")
     return name
 
 
@@ -178,6 +180,8 @@ class Override(Settings):
     """Name of its conditions."""
     preset: str | None = None
     """Preset of its conditions. By default, the preset of the spec."""
+    unset: tuple[str, ...] = ()
+    """Dotted keys of the preset that return to their defaults, in addition to those of the spec."""
     scenario: SpecTable = Field(default_factory=dict)
     """Changes of the scenario of the spec."""
     agents: Granularity | None = None

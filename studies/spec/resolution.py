@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from typing import NamedTuple
 
 from pydantic import ValidationError
@@ -36,6 +37,8 @@ class UserTables(NamedTuple):
 
     preset: str
     """Preset of conditions that name no other."""
+    unset: Sequence[str]
+    """Dotted keys of the preset that return to their defaults."""
     sections: SpecTable
     """Scenario, topology and learner, which all conditions share."""
     sweep: Mapping[str, Sequence[object]]
@@ -48,7 +51,9 @@ class UserTables(NamedTuple):
     """Stages of training of conditions without stages of their own."""
 
 
-def resolve(preset: object, user: SpecTable, where: str = "") -> ConditionSettings:
+def resolve(
+    preset: object, user: SpecTable, where: str = "", unset: Sequence[str] = ()
+) -> ConditionSettings:
     """Return the settings of a condition.
 
     Parameters
@@ -59,6 +64,8 @@ def resolve(preset: object, user: SpecTable, where: str = "") -> ConditionSettin
         The merged tables of the user, which override the preset.
     where
         Name of the condition, which ends messages.
+    unset
+        Dotted keys of the preset that return to their defaults.
 
     Raises
     ------
@@ -72,7 +79,19 @@ def resolve(preset: object, user: SpecTable, where: str = "") -> ConditionSettin
     if scenario.kind != base["scenario"]["kind"]:
         base = merge(base, own.other_scenarios)
     base = override(base, expand_sections(scenario.scenario_defaults(str(preset))))
+    for key in unset:
+        base = _without(base, key, where)
     return _validate(override(base, user), where)
+
+
+def _without(base: SpecTable, key: str, where: str) -> SpecTable:
+    """Return the table of a preset without a dotted key and the keys below it."""
+    entries = dict(flat(base))
+    kept = {name: value for name, value in entries.items() if not f"{name}.".startswith(f"{key}.")}
+    if len(kept) == len(entries):
+        raise SpecError(f"unset: the preset does not set {key!r}; {closest(key, entries)}{where}")
+    empty: TomlTable = {}
+    return reduce(merge, (nested(name, value) for name, value in kept.items()), empty)
 
 
 def conditions_of(spec: UserTables) -> tuple[Condition, ...]:
@@ -131,7 +150,8 @@ def _condition(
         user = merge(for_control(layer.get("learner", {}), user), layer)
     if "preset" in point:
         user = for_control(_preset(preset, where).table["learner"], user)
-    settings = resolve(preset, user, where)
+    unset = (*spec.unset, *(table.unset if table else ()))
+    settings = resolve(preset, user, where, unset)
     curriculum = spec.curriculum
     if table and table.curriculum is not None:
         curriculum = table.curriculum

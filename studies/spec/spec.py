@@ -66,7 +66,7 @@ class Spec(Settings):
 
     >>> from nested_agents.core.learners.td import TDLambdaSettings
     >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
-    >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalised=True)}
+    >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalized=True)}
     >>> [c.label for c in Spec(overrides=[*ridges, online]).conditions()]
     ['ridge 1.0', 'ridge 100.0', 'online']
     """
@@ -77,6 +77,9 @@ class Spec(Settings):
     """Name of the study: what is measured and how it is analyzed."""
     preset: str = "default"
     """Preset that the tables below override."""
+    unset: tuple[str, ...] = ()
+    """Dotted keys of the preset that return to their defaults, which TOML cannot write if they are
+    none: ``unset = ["learner.rule_base.memberships"]``."""
     seeds: tuple[Seed, ...] = tuple(range(8))
     """List of seeds, or their number n for the seeds 0 to n - 1."""
     episodes: Length = 20
@@ -195,6 +198,7 @@ class Spec(Settings):
         spec._conditions = conditions_of(
             UserTables(
                 spec.preset,
+                spec.unset,
                 sections_of(spec),
                 spec.sweep,
                 spec.overrides,
@@ -346,7 +350,10 @@ class Spec(Settings):
     def table(self) -> TomlTable:
         """Return the spec as a table that `of` reads back."""
         table = _filled(self.model_dump())
-        table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
+        table["overrides"] = [
+            _filled({**override, "unset": override["unset"] or None})
+            for override in table.get("overrides", ())
+        ]
         if self.seeds == tuple(range(len(self.seeds))):
             table["seeds"] = len(self.seeds)
         if not self.keep_teams:

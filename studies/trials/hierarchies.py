@@ -17,7 +17,7 @@ def hierarchies_of(spec: Spec) -> Iterator[HierarchyView]:
         If a hierarchy cannot be built, in one line.
     """
     seen = set[object]()
-    for label, settings in _labelled(spec):
+    for label, settings in _labeled(spec):
         world = settings.scenario.model_dump_json(), settings.agents, settings.topology
         if world in seen:
             continue
@@ -33,7 +33,7 @@ def hierarchies_of(spec: Spec) -> Iterator[HierarchyView]:
             yield HierarchyView(label, hierarchy, scenario.groups, n_actions, failures)
 
 
-def _labelled(spec: Spec) -> Iterator[tuple[str, ConditionSettings]]:
+def _labeled(spec: Spec) -> Iterator[tuple[str, ConditionSettings]]:
     for condition in spec.conditions():
         yield condition.label, condition.settings
         for name, settings in condition.evaluations:

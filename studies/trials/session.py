@@ -7,9 +7,8 @@ read results do not import learners.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
-from time import perf_counter, process_time
+from time import process_time
 from typing import Any
 
 from ...core.agents.loop import StepRecord, control_loop, world_seed
@@ -19,6 +18,7 @@ from ...core.interface.abilities import Batched, Recorded
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import checked_scenario
 from ...core.interface.stacked import LoopedEnvironments
+from ...core.numerics import working_seconds
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
 from ..store.database import EVALUATION, STAGE
@@ -155,12 +155,6 @@ class Session:
         return len(self._training_rows)
 
     @classmethod
-    def compiled(cls, trial: Trial) -> Session:
-        """Return a session whose durations exclude compilation."""
-        cls(replace(trial, episodes=1, steps=3, curriculum=())).train(1)
-        return cls(trial)
-
-    @classmethod
     def restored(cls, trial: Trial, arrays: Recording) -> Session:
         """Return a session with the trained team whose arrays a trial stored.
 
@@ -242,7 +236,7 @@ class Session:
         )
 
     def _train_in_parallel(self, decisions: int, start_cpu_s: float) -> None:
-        start = perf_counter()
+        start = working_seconds()
         rates = [m.name for m in self._measures if m.source == "terminated"]
         done = self.trained
         while self._parallel_loop.decisions < decisions:
@@ -253,7 +247,7 @@ class Session:
                 done += 1
             self.training_cpu_s = process_time() - start_cpu_s
             self.save_checkpoint()
-        self._watch.seconds["learning"] += perf_counter() - start
+        self._watch.seconds["learning"] += working_seconds() - start
 
     def _record(self, record: StepRecord) -> None:
         """Record a step if `Trial.recorded` contains its episode."""

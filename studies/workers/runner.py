@@ -81,7 +81,9 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
 
     SystemExit and KeyboardInterrupt are failures of the trial, too, because workers ignore Ctrl-C.
     """
-    start = time.perf_counter()
+    from ...core.numerics import working_seconds  # status does without NumPy
+
+    start = working_seconds()
     error = None
     result = None
     try:
@@ -89,7 +91,7 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
             result = run_trial(trial)
     except BaseException:
         error = storable(traceback.format_exc())
-    return Outcome(trial, error, time.perf_counter() - start, result)
+    return Outcome(trial, error, working_seconds() - start, result)
 
 
 def storable(error: str) -> str:

@@ -35,7 +35,7 @@ def test_every_cell_runs_or_says_why_not_as_the_page_does() -> None:
         ("messages", "lost", "mappo", "left out"),
         ("lookahead", "none", "mixed", "yes"),
         ("further", "kept team", "td-lambda", "yes"),
-        ("neighbours", "simultaneous", "fitted-q", "no"),
+        ("neighbors", "simultaneous", "fitted-q", "no"),
     ],
 )
 def test_cells_of_each_verdict(axis: str, case: str, learner: str, verdict: str) -> None:

@@ -9,6 +9,7 @@ from programs import main
 from published_tables import print_table
 
 import nested_agents as na
+from nested_agents.studies.catalogue.wheel_failure import AT_END
 from nested_agents.studies.results.notation import format_estimate, format_number
 from nested_agents.studies.results.statistics import bootstrap
 from research import RESULTS
@@ -85,13 +86,13 @@ def test_decisions_to_a_success_rate() -> None:
 
 def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:
     path = RESULTS / "large-failures.json"
-    assert main(["table", str(path), "--columns", "just after", "end", "--format", "csv"]) == 0
+    assert main(["table", str(path), "--columns", "just after", AT_END, "--format", "csv"]) == 0
     rows: dict[str, list[str]] = {}
     for row in csv.DictReader(capsys.readouterr().out.splitlines()):
         fault, adapting = row["condition"].split(": ")
         if adapting == "nothing":
             rows[fault] = [_rounded(row["just after"])]
-        rows[fault].append(_rounded(row["end"]))
+        rows[fault].append(_rounded(row[AT_END]))
     page = PAGE.read_text(encoding="utf-8")
     for fault, cells in rows.items():
         line = f"| {fault.replace(' seized', '')} | {' | '.join(cells)} |"

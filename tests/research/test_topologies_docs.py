@@ -173,7 +173,7 @@ def test_the_table_of_orders(names: tuple[str, ...], task: str) -> None:
             assert line in PAGE.read_text(encoding="utf-8"), f"research/notebooks/edges.md: {line}"
 
 
-def test_the_table_of_orders_by_who_hears_a_neighbour() -> None:
+def test_the_table_of_orders_by_who_hears_a_neighbor() -> None:
     fitted, ppo = (
         compare_conditions(na.load(RESULTS / f"orders-line{own}.json").results, by="topology").table
         for own in ("", "-ppo")

@@ -46,7 +46,7 @@ def test_islands_are_an_environment_of_pettingzoo(capsys: pytest.CaptureFixture[
     assert "Passed Parallel API test" in capsys.readouterr().out
 
 
-def test_islands_send_what_no_neighbour_disturbs() -> None:
+def test_islands_send_what_no_neighbor_disturbs() -> None:
     env = Aloha(arrival=0.0)
     env.reset(seed=0)
     seen, rewards, *_ = env.step({a: a in ("island1", "island2", "island9") for a in env.agents})
@@ -62,7 +62,7 @@ def test_islands_send_what_no_neighbour_disturbs() -> None:
 
 @pytest.mark.parametrize(("is_told", "reached"), [(True, 9.25), (False, 6.15)])
 def test_rules_of_thumb_send_messages(is_told: bool, reached: float) -> None:
-    """Islands send unless a neighbour listed before does; or those of one colour of a board."""
+    """Islands send unless a neighbor listed before does; or those of one color of a board."""
     env, returns = Aloha(), np.zeros(100)
     before = np.tril(env.near)
     for episode in range(len(returns)):

@@ -71,10 +71,10 @@ def test_the_paper_s_numbers_stand_beside_ours(capsys) -> None:
     assert capsys.readouterr().out.startswith("% needs \\usepackage{booktabs}")
 
 
-def test_colours_of_a_drawn_hierarchy_are_explained(tmp_path) -> None:
+def test_colors_of_a_drawn_hierarchy_are_explained(tmp_path) -> None:
     path = tmp_path / "teams.svg"
     draw(Hierarchy("abcd", [("a", "b"), ("a", "c"), ("c", "d")]), path, bodies=[(0, 1), (2, 3)])
-    assert "colours: bodies" in path.read_text()
+    assert "colors: bodies" in path.read_text()
 
 
 def test_a_failure_after_the_last_episode_is_refused(tmp_path, capsys) -> None:

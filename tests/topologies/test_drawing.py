@@ -9,7 +9,7 @@ from matplotlib.textpath import TextPath
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.topologies import build, parse
-from nested_agents.topologies.drawing import ACROSS, DOWN, HEIGHT, WIDTH, draw, positions
+from nested_agents.topologies.drawing import ACROSS, DOWN, HEIGHT, WIDTH, draw, picture, positions
 
 TEXTS = ("chain", "tree:2", "star", "teams", "teams:star", "independent", "random:3")
 
@@ -55,6 +55,17 @@ def test_a_title_is_as_wide_as_the_picture_at_most(tmp_path: Path) -> None:
     width = float(ElementTree.parse(tmp_path / "picture.svg").getroot().attrib["width"][:-2])
     drawn = TextPath((0, 0), title, size=10).get_extents().width
     assert drawn < width
+
+
+def test_long_names_are_as_large_as_others_and_stay_in_their_box() -> None:
+    names = ["a", "$x$ and $y$", "junction-north-12.phase4", "x" * 200]
+    figure = picture(Hierarchy(names, []))
+    shown = [text for text in figure.axes[0].texts if not text.get_text().isdigit()]
+    assert {text.get_fontsize() for text in shown if text.get_text()} == {8.0}
+    assert "$x$ and $y$" in {text.get_text() for text in shown if not text.get_parse_math()}
+    for text in shown:
+        if text.get_text()[:1] in "ajx$":
+            assert text.get_window_extent().width / figure.dpi < WIDTH - 0.2
 
 
 def test_edges_lead_right_unless_the_picture_folds() -> None:

@@ -135,10 +135,10 @@ def graphml(rest: str, default: str = "directed") -> str:
 
 NODES = '{"directed": true, "nodes": [{"id": "a"}, {"id": "b"}], '
 REFUSED = {
-    "twice.graphml": (yed(("a", "b", "b", "d")), "label 'b' is that of 2 nodes"),
+    "twice.graphml": (yed(("a", "b", "b", "d")), "label 'b' belongs to 2 nodes"),
     "some.graphml": (
         gephi("n").replace('<data key="label">c</data>', ""),
-        "node 'n2' has no label, others have one",
+        "node 'n2' has no label, but other nodes have one",
     ),
     "empty.graphml": (yed(("a", "b", " ", "d")), "'' is no name of an agent"),
     "texts.json": ('{"nodes": ["a"], "links": []}', "nodes must be a list of tables with id"),
@@ -149,7 +149,7 @@ REFUSED = {
     "id.json": ('{"nodes": [{"id": null}], "links": []}', "None is no name of an agent"),
     "repeated_node.json": (
         '{"nodes": [{"id": 1}, {"id": "1"}], "links": []}',
-        "id '1' is that of 2 nodes",
+        "id '1' belongs to 2 nodes",
     ),
     "repeated_edge.json": (
         NODES + '"edges": [{"source": "a", "target": "b"}, {"source": "a", "target": "b"}]}',
@@ -184,7 +184,7 @@ REFUSED = {
     "nodes.toml": ('nodes = [{id = "a"}]\nedges = []\ndirected = "yes"', "directed = 'yes'"),
     "beside.json": (
         '{"topology": {"edges": [["a", "b"]]}, "edges": [["b", "a"]]}',
-        "key 'edges' beside topology",
+        "unknown key 'edges', allowed: topology alone",
     ),
     "alone.json": (
         '{"edges": [["a", "b"]], "alone": ["b"]}',
@@ -218,7 +218,7 @@ REFUSED = {
         "2 elements <graph>, allowed: one",
     ),
     "repeated_edge.graphml": (graphml(EDGE * 2), "edge 'a' -> 'b' is given more than once"),
-    "repeated_node.graphml": (graphml('<node id="b"/>'), "id 'b' is that of 2 nodes"),
+    "repeated_node.graphml": (graphml('<node id="b"/>'), "id 'b' belongs to 2 nodes"),
     "loop.graphml": (graphml(EDGE.replace("b", "a")), "leads from an agent to itself"),
     "stray.graphml": (graphml(EDGE.replace('"b"', '"c"')), "edge 'a' -> 'c': known: a, b"),
     "hyperedge.graphml": (graphml("<hyperedge/>"), "element <hyperedge> in <graph>"),

@@ -49,7 +49,7 @@ def test_pairs_or_a_graph(written, body: str) -> None:
     assert build(settings, AGENTS).edges == ((0, 1), (1, 2), (2, 3))
 
 
-def test_an_undirected_graph_is_one_of_neighbours(written) -> None:
+def test_an_undirected_graph_is_one_of_neighbors(written) -> None:
     body = "import networkx as nx\n    return nx.cycle_graph(agents)"
     hierarchy = build(parse(written(f"def f(agents, groups):\n    {body}\n")), AGENTS)
     assert hierarchy.edges == ()
@@ -69,7 +69,7 @@ MUTE = "class Mute:\n    def __str__(self): raise RuntimeError('no name')\n"
         ("def f(agents): return []", "f raised TypeError"),
         ("def f(agents, groups): return groups[9]", "f raised IndexError"),
         ("def f(agents, groups): return 3", "f returned int, allowed: a networkx DiGraph"),
-        ("def f(agents, groups): return [('a', 'b', 'c')]", "a list of nothing but pairs"),
+        ("def f(agents, groups): return [('a', 'b', 'c')]", "a list of pairs"),
         ("def f(agents, groups): return [('a', 'b')] * 2", "edge a -> b is given more than once"),
         ("def f(agents, groups): return [('a', 'x')]", "unknown agent 'x' in the graph"),
         ("def f(agents, groups): return [('a', 'b'), ('b', 'a')]", "cycle a -> b -> a"),
@@ -120,6 +120,11 @@ def test_a_file_may_have_dataclasses_and_postponed_annotations(written) -> None:
         "    return [(pair.above, pair.below)]\n"
     )
     assert build(parse(text), AGENTS).edges == ((0, 1),)
+
+
+def test_a_parameter_after_a_colon_is_refused_with_the_table_that_sets_it() -> None:
+    with pytest.raises(ValueError, match=r"mine\.py:f:3.*\{ kind = \"mine\.py:f\", PARAMETER"):
+        parse("mine.py:f:3")
 
 
 @pytest.mark.parametrize("text", ["mine.py:", "mine.py:2f"])

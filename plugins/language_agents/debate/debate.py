@@ -48,7 +48,7 @@ class Debate(na.Scenario):
         self.agents = tuple(f"agent{i + 1}" for i in range(n))
         self.roles = ("agent",) * n
         self.action_set = na.ActionSet(ANSWERS, (0.0, 0.0), (0.0, 0.0), neutral=0)
-        draft = na.Variable("draft", "1", 0, 1, centres=(0.0, 1.0), labels=ANSWERS)
+        draft = na.Variable("draft", "1", 0, 1, centers=(0.0, 1.0), labels=ANSWERS)
         self.state_space = na.StateSpace("debate", (draft,), 1)
         self.errors = np.linspace(settings.least_error, settings.greatest_error, n)
         if settings.leader_error is not None:

@@ -34,10 +34,10 @@ def test_exact_values_are_those_worked_by_hand() -> None:
     assert exact(alone, errors) == pytest.approx(two_or_more)
     assert exact(alone, errors, "last") == pytest.approx(r)
     assert exact(alone, errors, "all") == pytest.approx(1 - (1 - p) * (1 - q) * (1 - r))
-    # the centre hears both others: it is wrong if most of the three drafts are
-    centre = Hierarchy("abc", [("a", "c"), ("b", "c")])
-    assert exact(centre, errors, "last") == pytest.approx(two_or_more)
-    # neighbours hear each other from the second round on
+    # the center hears both others: it is wrong if most of the three drafts are
+    center = Hierarchy("abc", [("a", "c"), ("b", "c")])
+    assert exact(center, errors, "last") == pytest.approx(two_or_more)
+    # neighbors hear each other from the second round on
     pairs = Hierarchy("abc", [], [("a", "b"), ("a", "c"), ("b", "c")])
     assert exact(pairs, errors, "all") == exact(alone, errors, "all")
     assert exact(pairs, errors, "all", rounds=2) == pytest.approx(two_or_more)

@@ -5,7 +5,7 @@
   const at = (id) => document.getElementById(id);
   const stage = at("stage"), scrub = at("scrub"), play = at("play"), speed = at("speed");
   const context = stage.getContext("2d");
-  const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7"];
+  const COLORS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7"];
   let shown = null; // the episode on stage, unpacked
   let moment = 0; // in steps, with fractions
   let running = 0, before = 0;
@@ -52,7 +52,7 @@
     const middle = [(left + right) / 2, (low + high) / 2];
     const world = () => context.setTransform(dots * scale, 0, 0, -dots * scale,
       dots * (width / 2 - scale * middle[0]), dots * (height / 2 + scale * middle[1]));
-    const line = 1 / scale; // one pixel in metres
+    const line = 1 / scale; // one pixel in meters
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, stage.width, stage.height);
     world();
@@ -73,7 +73,7 @@
       ahead(ink("goal"), line);
     }));
     trail(shown.box, ink("box"), line);
-    shown.robots.forEach((pose, r) => trail(pose, COLOURS[r % COLOURS.length], line));
+    shown.robots.forEach((pose, r) => trail(pose, COLORS[r % COLORS.length], line));
     within(between(shown.box), () => outline(() => {
       context.globalAlpha = 0.75;
       context.fillStyle = ink("box");
@@ -89,8 +89,8 @@
     tell();
   }
 
-  function grid(colour, wide, tall, middle, line) {
-    context.strokeStyle = colour;
+  function grid(color, wide, tall, middle, line) {
+    context.strokeStyle = color;
     context.lineWidth = line;
     context.beginPath();
     const step = 0.25;
@@ -114,9 +114,9 @@
     paint();
   }
 
-  // A tick from the centre: which way the box looks.
-  function ahead(colour, line) {
-    context.strokeStyle = colour;
+  // A tick from the center: which way the box looks.
+  function ahead(color, line) {
+    context.strokeStyle = color;
     context.lineWidth = 1.5 * line;
     context.beginPath();
     context.moveTo(0, 0);
@@ -124,12 +124,12 @@
     context.stroke();
   }
 
-  function trail(pose, colour, line) {
+  function trail(pose, color, line) {
     const now = between(pose);
     context.beginPath();
     for (let t = 0; t <= moment; t++) context.lineTo(pose.x[t], pose.y[t]);
     context.lineTo(now[0], now[1]);
-    context.strokeStyle = colour;
+    context.strokeStyle = color;
     context.globalAlpha = 0.7;
     context.lineWidth = 1.2 * line;
     context.stroke();
@@ -137,11 +137,11 @@
   }
 
   function robot(r, ink, line) {
-    const { radius, wheels } = shown.shape, colour = COLOURS[r % COLOURS.length];
+    const { radius, wheels } = shown.shape, color = COLORS[r % COLORS.length];
     const now = Math.round(moment);
     context.beginPath();
     context.arc(0, 0, radius, 0, 2 * Math.PI);
-    context.fillStyle = context.strokeStyle = colour;
+    context.fillStyle = context.strokeStyle = color;
     context.globalAlpha = shown.contact[r][now] ? 0.9 : 0.4;
     context.fill();
     context.globalAlpha = 1;
@@ -185,9 +185,9 @@
     });
   }
 
-  function ruler(colour, dots, scale, height) {
+  function ruler(color, dots, scale, height) {
     context.setTransform(dots, 0, 0, dots, 0, 0);
-    context.strokeStyle = context.fillStyle = colour;
+    context.strokeStyle = context.fillStyle = color;
     context.lineWidth = 1.5;
     context.beginPath();
     context.moveTo(12, height - 16);
@@ -255,7 +255,8 @@
     pause();
     options(at("seed"), distinct(chosen("condition"), "seed"));
     const numbers = distinct(chosen("condition", "seed"), "number");
-    options(at("episode"), numbers, (n) => (numbers.length < 2 ? String(n) : n === numbers[0] ? `${n} (first)` : `${n} (last)`));
+    const places = new Map([[numbers[0], " (first)"], [numbers.at(-1), numbers.length > 1 ? " (last)" : ""]]);
+    options(at("episode"), numbers, (n) => `${n}${places.get(n) ?? ""}`);
     shown = await unpack(chosen("condition", "seed", "number")[0]);
     scrub.max = shown.steps;
     at("which").textContent = `${shown.condition}, seed ${shown.seed}, training episode ${shown.number}`;
@@ -272,7 +273,7 @@
       item.append(sign, text);
       return item;
     };
-    const robots = shown.robots.slice(0, COLOURS.length).map((_, r) => mark(COLOURS[r], `robot ${r + 1}`));
+    const robots = shown.robots.slice(0, COLORS.length).map((_, r) => mark(COLORS[r], `robot ${r + 1}`));
     at("legend").replaceChildren(...robots, mark("var(--box)", "box"), mark("dashed", "goal"),
       "pale: no contact; line at a wheel: its speed; red cross: failed wheel" +
       (shown.talking ? "; dashed ring: its messages fail" : ""));

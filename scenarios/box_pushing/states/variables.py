@@ -110,12 +110,12 @@ def _variable(
 
 
 def _angle(
-    centres: tuple[float, ...],
+    centers: tuple[float, ...],
     labels: tuple[str, ...] = ("far right", "right", "ahead", "left", "far left"),
     **options: bool,
 ) -> Callable[[Callable[[Situation, Robot], float]], StateVariable]:
     """Return the decorator of an angle, which changes its sign in the mirror image."""
-    described: dict[str, Any] = {"periodic": True, "centres": centres, "labels": labels}
+    described: dict[str, Any] = {"periodic": True, "centers": centers, "labels": labels}
     return _variable("rad", -pi, pi, mirrored="opposite", **described, **options)
 
 
@@ -126,7 +126,7 @@ _gap = _variable(
     "m",
     0.0,
     0.5,
-    centres=(0.0, 0.015, 0.06, 0.2, 0.5),
+    centers=(0.0, 0.015, 0.06, 0.2, 0.5),
     labels=("touching", "close", "near", "away", "far"),
     mirrored="same",
 )
@@ -134,7 +134,7 @@ _wide_error = _variable(
     "m",
     -1.0,
     1.0,
-    centres=(-0.8, -0.3, -0.08, 0.0, 0.08, 0.3, 0.8),
+    centers=(-0.8, -0.3, -0.08, 0.0, 0.08, 0.3, 0.8),
     labels=("very far right", "far right", "right", "none", "left", "far left", "very far left"),
     contact=True,
     common=True,
@@ -177,7 +177,7 @@ def push_bearing(situation: Situation, robot: Robot) -> float:
     "m",
     -0.4,
     0.4,
-    centres=(-0.3, -0.06, 0.0, 0.06, 0.3),
+    centers=(-0.3, -0.06, 0.0, 0.06, 0.3),
     labels=("far right", "right", "none", "left", "far left"),
     common=True,
     mirrored="opposite",
@@ -191,7 +191,7 @@ def cross_track_error(situation: Situation, robot: Robot) -> float:
     "m",
     0.0,
     1.1,
-    centres=(0.0, 0.1, 0.3, 0.6, 1.1),
+    centers=(0.0, 0.1, 0.3, 0.6, 1.1),
     labels=("there", "close", "near", "away", "far"),
     common=True,
     mirrored="same",
@@ -205,7 +205,7 @@ def box_distance(situation: Situation, robot: Robot) -> float:
     "m",
     -0.05,
     0.05,
-    centres=(-0.02, -0.005, 0.0, 0.01, 0.03),
+    centers=(-0.02, -0.005, 0.0, 0.01, 0.03),
     labels=("receding", "slipping", "none", "slow", "fast"),
     common=True,
     mirrored="same",
@@ -240,7 +240,7 @@ def face_bearing(situation: Situation, robot: Robot) -> float:
     "1",
     0.0,
     1.0,
-    centres=(0.0, 0.25, 0.5, 0.75, 1.0),
+    centers=(0.0, 0.25, 0.5, 0.75, 1.0),
     labels=("none", "some", "half", "most", "all"),
     mirrored="same",
 )

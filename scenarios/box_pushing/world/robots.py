@@ -1,7 +1,7 @@
 """Robots on wheels, and the forces between wheels and ground.
 
 A robot has a round body, wheels that all point ahead, and infrared sensors around it. Its frame has
-its origin at the centre of the body, x ahead, y to the left, angles counter-clockwise. A wheel is a
+its origin at the center of the body, x ahead, y to the left, angles counter-clockwise. A wheel is a
 soft velocity servo on a sticky ground: where it touches the ground it pulls the body with
 `stiffness` times the difference between its own speed and the body's forward speed there, and
 resists sideways motion with `lateral_stiffness`; both together never exceed its traction limit (the
@@ -67,7 +67,7 @@ def compliance(robot: RobotSettings) -> FloatArray:
     Returns
     -------
     FloatArray
-        ``(3, 3)`` twist per wrench at its centre, body frame [m/s, m/s, rad/s per N, N, N m].
+        ``(3, 3)`` twist per wrench at its center, body frame [m/s, m/s, rad/s per N, N, N m].
     """
     return np.linalg.inv(resistance(robot))
 
@@ -168,7 +168,7 @@ def wheel_model(
     grip
         ``(n,)`` multiplies the stiffness ahead of every wheel: 1 healthy, 0 free-wheeling.
     length
-        Units of length per metre.
+        Units of length per meter.
     """
     first = np.cumsum([0] + [len(robot.wheels) for robot in robots])
     wheels = [(robot, wheel) for robot in robots for wheel in robot.wheels]

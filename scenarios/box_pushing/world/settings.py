@@ -34,7 +34,7 @@ class RewardSettings(Settings):
     c1: NonNegative = 0.01
     """Weight of R1 (Eq. 16), the reward for the box being near the goal."""
     r1: NonNegative = 1.5
-    """Decay of R1 per metre of the box's distance to the goal (Eq. 16)."""
+    """Decay of R1 per meter of the box's distance to the goal (Eq. 16)."""
     c2: NonNegative = 0.0007
     """Weight of R2 and R3 (Eq. 16), the reward for robots being near the box."""
     r2: NonNegative = 5.0
@@ -145,9 +145,9 @@ class WheelSettings(Settings):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
     """Name of the wheel; its agent is called ``robot1.NAME``."""
     x: float
-    """Position of the wheel ahead of the centre [m]."""
+    """Position of the wheel ahead of the center [m]."""
     y: float
-    """Position of the wheel to the left of the centre [m]."""
+    """Position of the wheel to the left of the center [m]."""
 
 
 class RobotSettings(Described):
@@ -177,7 +177,7 @@ class RobotSettings(Described):
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the centre [kg m2], that of a disc."""
+        """Moment of inertia about the center [kg m2], that of a disc."""
         return self.mass * self.radius**2 / 2
 
     @property
@@ -186,7 +186,7 @@ class RobotSettings(Described):
         return self.traction * self.mass * GRAVITY / len(self.wheels)
 
 
-Normalisation = Literal["exponential", "linear", "binary"]
+Normalization = Literal["exponential", "linear", "binary"]
 
 
 class InfraredSettings(Settings):
@@ -200,7 +200,7 @@ class InfraredSettings(Settings):
 
     reach: Positive = 0.06
     """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
-    normalisation: Normalisation = "exponential"
+    normalization: Normalization = "exponential"
     """Reading in [0, 1] at a distance within reach: exp(-distance / decay), 1 - distance / reach,
     or 1. When touching, it is 1."""
     decay: Positive = 0.015
@@ -212,17 +212,17 @@ class InfraredSettings(Settings):
     @model_validator(mode="after")
     def _decays(self) -> Self:
         default = type(self).model_fields["decay"].default
-        if self.normalisation != "exponential" and self.decay != default:
+        if self.normalization != "exponential" and self.decay != default:
             raise ValueError(
-                f"decay = {self.decay} is for normalisation = 'exponential', "
-                f"received {self.normalisation!r}"
+                f"decay = {self.decay} is for normalization = 'exponential', "
+                f"received {self.normalization!r}"
             )
         return self
 
     @property
     def response(self) -> Response:
         """Constants of the response, for kernels."""
-        return Response(self.reach, self.decay, get_args(Normalisation).index(self.normalisation))
+        return Response(self.reach, self.decay, get_args(Normalization).index(self.normalization))
 
     def reading(self, distance: FloatArray) -> FloatArray:
         """Return the readings at distances [m] straight ahead; negative distances touch."""

@@ -1,6 +1,6 @@
 """Initial poses of robots, box and goal.
 
-The goal pose is always (1 m, 0, 0): one metre away in the easier starts' mean direction, unless
+The goal pose is always (1 m, 0, 0): one meter away in the easier starts' mean direction, unless
 distances are in units of the box. *Bearing* is the direction from box to goal, *behind* the back of
 the box (its -x side). A further distribution is one `Start` and one line in `STARTS`.
 """
@@ -45,9 +45,12 @@ class Start:
     """Least and greatest distance between a robot's surface and the box's [m]."""
     around: bool = False
     """Whether robots stand anywhere around the box, or side by side behind it."""
+    spread: float = 1.0
+    """Fraction of the free space behind the box that is distributed randomly between robots."""
 
 
 STARTS: dict[str, Start] = {
+    "fixed": Start(1.0, 0.0, 0.0, 0.0, (0.025, 0.025), spread=0.0),
     "easy": Start(0.6, radians(10), radians(10), radians(10), (0.005, 0.045)),
     "medium": Start(1.0, radians(25), radians(25), radians(20), (0.005, 0.045)),
     "hard": Start(1.0, pi, pi, pi, (0.01, 0.15), around=True),
@@ -142,7 +145,9 @@ def _behind(
             f"box {box.name!r} of {most - least:.3f} m"
         )
     # Sorted uniform numbers distribute the free space evenly between and around the robots.
-    offsets = most - np.sort(rng.uniform(0, room, len(robots))) - np.cumsum(spans) + spans / 2
+    even = room * np.arange(1, len(robots) + 1) / (len(robots) + 1)
+    free = even + spec.spread * (np.sort(rng.uniform(0, room, len(robots))) - even)
+    offsets = most - free - np.cumsum(spans) + spans / 2
     poses = np.empty((len(robots), 3))
     for r, robot in enumerate(robots):
         gap = robot.radius + rng.uniform(*spec.gaps)

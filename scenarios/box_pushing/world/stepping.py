@@ -52,7 +52,7 @@ class Physics(NamedTuple):
     dt: float
     """Duration of a step [s]."""
     unit: float
-    """Units of Box2D per metre."""
+    """Units of Box2D per meter."""
     wheels: WheelModel
     """Wheels, in units of Box2D."""
     shape: BoxShape

@@ -1,7 +1,7 @@
 """The physical world: robots and a box on a plane, seen from above, in Box2D.
 
 The rest of the package speaks SI; Box2D wants bodies of 0.1 to 10 units, so that this module and
-`stepping`, and nothing else, talk to it in decimetres. A control period is a whole number of
+`stepping`, and nothing else, talk to it in decimeters. A control period is a whole number of
 physics steps: forces of all wheels, and one step of Box2D. All steps of a decision are one compiled
 call, see `stepping`. Where that is not possible, the same is done from Python.
 

@@ -118,7 +118,7 @@ def _of_evaluations(results: Results) -> Analysis:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure, a panel for every measure that is followed.
 
-    Lines are means over seeds, bands their 95% intervals. A condition has a colour and a style of
+    Lines are means over seeds, bands their 95% intervals. A condition has a color and a style of
     line of its own, so that lines upon each other are distinguished.
     """
     from ...presentation import figures as f  # matplotlib takes its time
@@ -143,7 +143,6 @@ def draw(analysis: Analysis) -> Figures:
         else:
             axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.grid(axis="y", alpha=0.25)
-    for axes in panels.flat[len(followed) - panels.shape[1] : len(followed)]:
         f.as_episodes(axes)
     same = len(set(seeds.values())) == 1
     labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]

@@ -32,7 +32,7 @@ PANELS = ("decision [ms]", "learning [ms]", "team [MB]", "messages")
 
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and measure its time and memory."""
-    session = Session.compiled(trial)
+    session = Session(trial)
     session.train(trial.episodes)
     team = session.team
     hierarchy = team.hierarchy

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -40,14 +40,14 @@ from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases, distinct
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from matplotlib.artist import Artist
 
 NUMBERS = ("onset",)
 """Numbers of whole trials that the analysis needs."""
 PUBLISHED = ("success",)
 """Measures in published results."""
 AT_END = "success at the end"
-"""Title of the compared measure."""
+"""Title of the compared measure, the main result."""
 SWEPT = "learner.self_model.enabled"
 """Key that is swept to run each condition with and without a self-model."""
 ADAPTS = {
@@ -59,10 +59,15 @@ ADAPTS = {
 """Adapting parts, by the value of `SWEPT` and the phase."""
 COLUMNS = 3
 """Maximum number of panels in a row of the figure."""
-FAILING = "#888888"
-"""Color of failures in the figure."""
-SHADE = 0.18
-"""Opacity of the area of a transient failure."""
+ONSET: dict[str, Any] = {"color": "black", "linewidth": 1.0, "linestyle": "-."}
+"""Look of the line at which a failure begins."""
+TRANSIENT: dict[str, Any] = {
+    "facecolor": "none",
+    "edgecolor": "#aaaaaa",
+    "hatch": "////",
+    "linewidth": 0.0,
+}
+"""Look of the area of a transient failure, which no band has."""
 SMOOTHED = 3
 """Number of episodes in the running mean of curves."""
 
@@ -94,12 +99,14 @@ def check(spec: Spec) -> None:
                 f"episodes = {spec.episodes}: wheel-failure needs {2 * BLOCK} or more, {BLOCK} "
                 f"before the failure and {BLOCK} with it"
             )
-        if not BLOCK <= onset <= spec.episodes - BLOCK:
-            raise SpecError(
-                f"scenario.failures: the first begins in episode {onset}, allowed {BLOCK} to "
-                f"{spec.episodes - BLOCK} of {spec.episodes} episodes "
-                f"(condition {condition.label!r})"
-            )
+        onsets = [begin for begin, _ in condition.settings.failure_spans]
+        for which, episode in (("first", onset), ("last", max(onsets))):
+            if not BLOCK <= episode <= spec.episodes - BLOCK:
+                raise SpecError(
+                    f"scenario.failures: the {which} begins in episode {episode}, allowed {BLOCK} "
+                    f"to {spec.episodes - BLOCK} of {spec.episodes} episodes "
+                    f"(condition {condition.label!r})"
+                )
 
 
 def _keeping_weights(session: Session) -> Team:
@@ -145,12 +152,14 @@ class Course(NamedTuple):
         }
         if self.end is not None:
             estimates["failure ends [episode]"] = exactly(self.end)
-            estimates["after its end"] = rate(course.from_episode(self.end))
-        estimates["end"] = rate(course.end)
-        if course.before.any():  # otherwise loss and recovery are undefined
+            if self.end <= course.success.shape[1] - BLOCK:
+                estimates["after its end"] = rate(course.from_episode(self.end))
+        estimates[AT_END] = rate(course.end)
+        if course.had_success.any():
             for name, values in course.measured.items():
                 measure = bounded(name, [course], self.longest)
-                estimates[measure.heading] = estimate_over_seeds(values, measure)
+                known = values[course.had_success]
+                estimates[measure.heading] = estimate_over_seeds(known, measure)
         return Summary(f"{self.fault}: {self.adapts}", len(course.success), estimates)
 
 
@@ -162,12 +171,20 @@ def analyse(results: Results) -> Analysis:
     courses = courses_of(results)
     gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
     notes = ["Rows: fault, then the parts that adapt to it."] if courses else []
-    if not all(course.measured.before.any() for course in courses):
-        notes.append("Recovery is not measured without successes before the failure.")
+    if not all(course.measured.had_success.all() for course in courses):
+        notes += _unmeasured(courses)
     if any(course.end is not None for course in courses):
         notes.append("Recovery after the end of a failure is not adaptation.")
     table = tuple(course.summary for course in courses)
     return Analysis(table, (*notes, *lines), courses, gains)
+
+
+def _unmeasured(courses: Sequence[Course]) -> Iterator[str]:
+    """Yield how many seeds had no success before the failure, a line for each fault."""
+    yield "Recovery and loss are not measured for seeds without success before the failure:"
+    for fault, had in {c.fault: c.measured.had_success for c in courses}.items():
+        if not had.all():
+            yield f"  {fault}: {len(had) - had.sum()} of {len(had)} seeds"
 
 
 def courses_of(results: Results) -> list[Course]:
@@ -227,47 +244,45 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure of success by episode with a panel for each fault.
 
     Lines are running means over seeds and episodes for each case of adaptation, with bands of 95%
-    intervals. Gray lines mark the onset of failures, gray areas transient failures.
+    intervals. Black lines mark the onset of failures, hatched areas transient failures.
     """
-    from ...presentation import figures as f  # matplotlib takes its time
+    from matplotlib.patches import Patch  # matplotlib takes its time
+
+    from ...presentation import figures as f
 
     courses = analysis.cases
     faults = distinct(course.fault for course in courses)
     cases = distinct(course.adapts for course in courses)
     figure, panels = f.grid(
-        len(faults), COLUMNS, (2.6, 2.1), (1.0, 1.2), least=5.6, sharex=True, sharey=True
+        len(faults), COLUMNS, (2.6, 2.2), (1.0, 1.2), least=5.6, sharex=True, sharey=True
     )
     columns = panels.shape[1]
     for axes, fault in zip(panels.flat, faults, strict=False):
-        for course in (c for c in courses if c.fault == fault):
+        own = [course for course in courses if course.fault == fault]
+        for begin, end in own[0].spans:
+            axes.axvline(begin - 0.5, **ONSET)
+            if end is not None:
+                axes.axvspan(begin - 0.5, end - 0.5, **TRANSIENT)
+        for course in own:
             success = course.measured.success
             cuts = {episode for span in course.spans for episode in span if episode is not None}
             curve = bootstrap(_smoothed(success, sorted(cuts)), bounds=(0, 1))
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
             f.draw_curve(axes, episodes, curve, cases.index(course.adapts), alpha=0.1)
-        _mark_failures(axes, next(c for c in courses if c.fault == fault))
         axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
         f.as_rates(axes)
+        f.as_episodes(axes)
         axes.grid(axis="y", alpha=0.25)
     for axes in panels[:, 0]:
         axes.set_ylabel("success")
-    for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:
-        f.as_episodes(axes)
-    handles = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
+    entries: list[Artist] = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
+    entries.append(f.handle("a failure begins", **ONSET))
     if any(course.end is not None for course in courses):
-        handles.append(f.handle("transient failure", color=FAILING, alpha=SHADE, linewidth=8))
+        entries.append(Patch(label="transient failure", **TRANSIENT))
     seeds = f.count_seeds(len(course.measured.success) for course in courses)
-    title = f"adapting\nmeans over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
-    f.add_legend(figure, handles, title, ncols=4 if len(handles) == 4 else 3)
+    title = f"what adapts; means over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
+    f.add_legend(figure, entries, title, ncols=3)
     return {"wheel-failure": figure}
-
-
-def _mark_failures(axes: Axes, course: Course) -> None:
-    """Mark onsets of failures by lines, and transient failures by areas."""
-    for begin, end in course.spans:
-        axes.axvline(begin - 0.5, color=FAILING, linewidth=0.8)
-        if end is not None:
-            axes.axvspan(begin - 0.5, end - 0.5, color=FAILING, alpha=SHADE, linewidth=0)
 
 
 def _smoothed(success: Array, cuts: Sequence[int]) -> Array:

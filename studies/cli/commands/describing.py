@@ -189,7 +189,7 @@ def cost(
                 from ...cost.figure import check
 
                 check(costs.cost_table(topology, sizes, **quantities).rows, plot)
-            say("measuring, first compiling what is not: no steps of more than a second or so")
+            say("Measuring. Code is compiled first; steps of over about a second are left out.")
         rows = costs.cost_table(
             topology,
             sizes,
@@ -254,7 +254,7 @@ def profile(spec: Path, seconds: float, form: str, changes: tuple[str, ...]) -> 
     from ...presentation.tables import in_csv
     from ...spec.spec import Spec
 
-    say("timing decisions of every condition, first compiling what is not")
+    say("Compiling code, then timing the decisions of every condition.")
     with refused():
         timed = profile_of(Spec.load(spec, changes), seconds)
     print_data(in_csv(timed.frame) if form == "csv" else f"{timed}\n")

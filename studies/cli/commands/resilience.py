@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from ...presentation.progress import say
 from .. import options
 from ..display import Form, in_form, print_data, print_table, print_text
 from ..loading import read_results, say_remarks
@@ -59,6 +60,8 @@ def resilience(
         print_data(report.json)
     elif form != "table":
         print_data(in_form(report.table, form))
+        if report.analysis.remark:
+            say(report.analysis.remark)
     else:
         print_table(report.table)
         print_text(*report.notes)

@@ -178,7 +178,7 @@ def test_slots_follow_who_is_told() -> None:
 def test_a_reward_of_a_terminal_state_that_does_not_absorb_is_received_once(world) -> None:
     """Its value is the reward itself, not that of receiving it for ever."""
     gamma = 0.9
-    settings = TDLambdaSettings(step_size=1.0, normalised=True, discount=gamma, trace_decay=0.0)
+    settings = TDLambdaSettings(step_size=1.0, normalized=True, discount=gamma, trace_decay=0.0)
     for absorbing, value in ((False, 2.0), (True, 2.0 / (1.0 - gamma))):
         team = Team(settings, world, chain_of(world.agents), policy_seed(0))
         states = world.reset(0)

@@ -147,7 +147,7 @@ def test_answers_that_mean_nothing_are_refused(answer, complaint: str) -> None:
         read_reply(answer, ("left", "right"), {"t": "1"})
 
 
-def test_neighbours_are_told_what_was_said_in_the_decision_before() -> None:
+def test_neighbors_are_told_what_was_said_in_the_decision_before() -> None:
     names = ["cart1", "cart2", "cart3"]
     beside = Hierarchy(names, [], [("cart1", "cart2")])
     team, world, calls = team_of("echo", hierarchy=beside)
@@ -189,7 +189,7 @@ def test_nobody_can_read_what_noise_has_replaced() -> None:
     assert [content is not None for _, (_, content) in heard] == is_same
 
 
-def test_delays_of_neighbours_add_to_the_decision_before() -> None:
+def test_delays_of_neighbors_add_to_the_decision_before() -> None:
     beside = Hierarchy(["cart1", "cart2"], [], [("cart1", "cart2")])
     failure = DelayedMessages(agents="cart1", decisions=1)
     team, world, calls = team_of("echo", 2, beside, [failure])

@@ -55,7 +55,7 @@ def test_whoever_is_there_keeps_its_ancestors_by_grandparents_alone(seed, gone) 
         assert all(not by_rule[rule].senders(one) for one in gone for rule in by_rule)
 
 
-def test_neighbours_of_who_leaves_are_joined_by_no_rule() -> None:
+def test_neighbors_of_who_leaves_are_joined_by_no_rule() -> None:
     line = Hierarchy("abc", [], [("a", "b"), ("b", "c")])
     assert without(line, [1], "grandparents").neighbors == ()
 

@@ -25,7 +25,7 @@ TABLES = {
         "start": "easy",
         "state_space": "paper",
         "reward": {"of": "robot"},
-        "infrared": {"normalisation": "linear"},
+        "infrared": {"normalization": "linear"},
         "action_repeat": 3,
     },
     "box, wide": {"kind": "box-pushing", "robots": 4, "state_space": "wide", "box": "circle"},

@@ -12,12 +12,12 @@ from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
         ({"low": 1.0, "high": 1.0}, r"variable 'x': range \[1.0, 1.0\]"),
         ({"low": 0.0, "high": np.inf}, r"variable 'x': range \[0.0, inf\]"),
         ({"low": np.nan, "high": 1.0}, r"variable 'x': range \[nan, 1.0\]"),
-        ({"low": 0.0, "high": 1.0, "centres": (0.5, 0.5)}, "centres .* must increase within"),
-        ({"low": 0.0, "high": 1.0, "centres": (0.5, 1.5)}, "centres .* must increase within"),
-        ({"low": 0.0, "high": 1.0, "centres": (0.0, np.nan)}, "centres .* must increase within"),
+        ({"low": 0.0, "high": 1.0, "centers": (0.5, 0.5)}, "centers .* must increase within"),
+        ({"low": 0.0, "high": 1.0, "centers": (0.5, 1.5)}, "centers .* must increase within"),
+        ({"low": 0.0, "high": 1.0, "centers": (0.0, np.nan)}, "centers .* must increase within"),
         (
-            {"low": 0.0, "high": 1.0, "centres": (0.0, 1.0), "labels": ("low",)},
-            "1 labels for 2 centres",
+            {"low": 0.0, "high": 1.0, "centers": (0.0, 1.0), "labels": ("low",)},
+            "1 labels for 2 centers",
         ),
     ],
 )

@@ -19,7 +19,7 @@ from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec
 
-SPACE = StateSpace("gap", (Variable("gap", "m", 0.0, 1.0, centres=(0.0, 0.5, 1.0)),))
+SPACE = StateSpace("gap", (Variable("gap", "m", 0.0, 1.0, centers=(0.0, 0.5, 1.0)),))
 TWO = ActionSet(("left", "right"), (0.0, 0.0), (0.0, 0.0), neutral=0)
 
 
@@ -208,7 +208,7 @@ def test_messages_have_no_mirror_image() -> None:
     FittedQSettings(mirrored=True).rules_over(SPACE, TWO, 0)
 
 
-def test_neighbours_are_refused_as_they_tell_nothing() -> None:
+def test_neighbors_are_refused_as_they_tell_nothing() -> None:
     names = ("agent1", "agent2", "agent3")
     with pytest.raises(ValueError, match=r"set topology\.decision_order"):
         team(Hierarchy(names, [], [names[:2]]))

@@ -45,7 +45,7 @@ def test_without_optimism_it_is_td():
     actions, rewards = plays(2)
     common = {"step_size": 0.1, "discount": 0.7}
     even = OptimisticTD(OptimisticTDSettings(falling=1.0, **common), TABLE, np.arange(1))
-    td = TDLambda(TDLambdaSettings(normalised=True, trace_decay=0.0, **common), TABLE, np.arange(1))
+    td = TDLambda(TDLambdaSettings(normalized=True, trace_decay=0.0, **common), TABLE, np.arange(1))
     for learner in (even, td):
         feed(learner, actions, rewards)
     np.testing.assert_allclose(even.theta, td.theta, atol=1e-12)

@@ -7,8 +7,8 @@ from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.learners.td import QLearningSettings
 from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
 
-PLACE = Variable("place", "1", 0, 2, centres=(0.0, 1.0, 2.0))
-MOVE = Variable("move", "1", 0, 1, centres=(0.0, 1.0))
+PLACE = Variable("place", "1", 0, 2, centers=(0.0, 1.0, 2.0))
+MOVE = Variable("move", "1", 0, 1, centers=(0.0, 1.0))
 SPACE = StateSpace("walk", (MOVE, PLACE), 1, actions=("move",))
 FULL = RuleBaseSettings(order="full")
 

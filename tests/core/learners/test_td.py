@@ -48,6 +48,14 @@ def frozen_increments(
     return total[0]
 
 
+@pytest.mark.parametrize("averaging", [1.0, 10.0])
+def test_every_state_has_the_initial_weight_as_its_value(averaging: float) -> None:
+    learner = learner_of(EIGHT_RULES, 2, initial_weight=0.5, averaging=averaging)
+    values = EIGHT_RULES.values_of_agents(learner.theta, np.full((2, 1, 3), 0.3))
+    assert values == pytest.approx(np.full((2, 1), 0.5))
+    assert np.array_equal(learner.weights, learner.theta)
+
+
 def test_eight_rules_over_three_steps_by_hand() -> None:
     # alpha = 0.1, gamma = 0.9, lambda = 0.5, so gamma lambda = 0.45. Rules in the order LLL, LLH,
     # LHL, LHH, HLL, HLH, HHL, HHH; all theta are zero at first.
@@ -125,9 +133,9 @@ def test_an_episode_starts_without_traces() -> None:
     assert (learner.theta[0] - before[0]).tolist() == [0, 0, 0.5, 0, 0]
 
 
-def test_a_normalised_step_removes_the_error_at_once() -> None:
+def test_a_normalized_step_removes_the_error_at_once() -> None:
     # alpha = 1 without discount and trace: f(s) becomes R(s), whatever the features.
-    learner = learner_of(FUZZY, step_size=1.0, discount=0.0, trace_decay=0.0, normalised=True)
+    learner = learner_of(FUZZY, step_size=1.0, discount=0.0, trace_decay=0.0, normalized=True)
     states = np.random.default_rng(1).uniform(-1, 1, (6, 2))
     for state in states:
         feed(learner, np.stack([state, np.zeros(2)]), np.array([0.7, 0.0]), False)
@@ -292,7 +300,7 @@ def test_averaged_weights_decide_and_others_learn(rules: RuleBase) -> None:
         "step_size": 0.3,
         "discount": 0.9,
         "trace_decay": 0.7,
-        "normalised": True,
+        "normalized": True,
     }
     plain, averaged = learner_of(rules, **common), learner_of(rules, averaging=4.0, **common)
     rng = np.random.default_rng(6)

@@ -14,9 +14,9 @@ from nested_agents.studies.trials.arrangement import check_conditions
 SPACE = StateSpace(
     "demo",
     (
-        Variable("gap", "m", 0.0, 2.0, centres=(0.0, 0.5, 2.0)),
+        Variable("gap", "m", 0.0, 2.0, centers=(0.0, 0.5, 2.0)),
         Variable(
-            "bearing", "rad", -np.pi, np.pi, periodic=True, centres=(-2.0, -0.5, 0.0, 0.5, 2.0)
+            "bearing", "rad", -np.pi, np.pi, periodic=True, centers=(-2.0, -0.5, 0.0, 0.5, 2.0)
         ),
     ),
 )  # fmt: skip
@@ -33,7 +33,7 @@ def test_the_value_is_the_formula() -> None:
     learner = written()
     states = np.array([[0.0, 0.0], [0.25, 1.25], [1.7, -1.0], [3.0, 0.0]])
     values = learner.rules.values(learner.theta[0], states)
-    by_hand = [0.0, -0.25 - 0.125, -1.7 - 0.1, -2.0]  # beyond the outermost centre it stays
+    by_hand = [0.0, -0.25 - 0.125, -1.7 - 0.1, -2.0]  # beyond the outermost center it stays
     np.testing.assert_allclose(values, by_hand)
     assert learner.theta.shape == (2, 8)
     assert (learner.theta[0] == learner.theta[1]).all()

@@ -43,7 +43,7 @@ class Rails(Scenario):
         self.roles = names or ("sledge",) * n
         self.limit = limit
         self.action_set = ActionSet()
-        speed = Variable("speed", "m/s", -1.0, 1.0, centres=(-1.0, -0.5, 0.0, 0.5, 1.0))
+        speed = Variable("speed", "m/s", -1.0, 1.0, centers=(-1.0, -0.5, 0.0, 0.5, 1.0))
         place = Variable("place", "m", -5.0, 5.0, periodic=True)
         total = Variable("total", "m/s", -4.0, 4.0)
         self.state_space = StateSpace("rails", (speed, place, total), 1, ("total",))

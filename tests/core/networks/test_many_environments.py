@@ -59,7 +59,7 @@ def weights(team):
     return np.concatenate([policy.weights for policy in team.parts[0].policies.values()])
 
 
-@pytest.mark.parametrize("extra", [{}, {"normalised": "values", "learning_rate_decisions": 200}])
+@pytest.mark.parametrize("extra", [{}, {"normalized": "values", "learning_rate_decisions": 200}])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_saved_team_continues_to_the_same_bits(kind, extra):
     table = {"kind": "spread", "most_decisions": 7}
@@ -127,7 +127,7 @@ def test_agents_see_what_they_are_told():
 
 @pytest.mark.parametrize("weights", ["all", "own"])
 def test_the_reward_of_the_team_is_the_mean_of_all_agents(weights):
-    team = team_of(weights=weights, normalised="values")
+    team = team_of(weights=weights, normalized="values")
     loop = loop_of(team)
     rewards = []
     step = loop._environments.step

@@ -119,7 +119,7 @@ def test_rewards_are_divided_by_the_deviation_of_discounted_returns():
 
 
 def test_a_truncated_episode_continues_by_its_value():
-    policy = policy_of(normalised="values", discount=0.5)
+    policy = policy_of(normalized="values", discount=0.5)
     append(policy, np.array([1.0, 2.0]), True)
     own, joint = np.ones((1, 2, 4), np.float32), np.ones((1, 3), np.float32)
     policy.bootstrap(np.array([True]), own, joint)

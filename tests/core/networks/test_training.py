@@ -26,7 +26,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "mappo": {"kind": "mappo", **PPO},
     "hierarchy-ppo": {"kind": "hierarchy-ppo", **PPO},
     "own weights": {"kind": "hierarchy-ppo", "weights": "own", **PPO},
-    "values": {"kind": "hierarchy-ppo", "normalised": "values", **PPO},
+    "values": {"kind": "hierarchy-ppo", "normalized": "values", **PPO},
 }
 MIXED = [
     {"agents": "cart1", "learner": KINDS["ippo"]},

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.core import locks
-from nested_agents.core.numerics import LOCK, stamp
+from nested_agents.core.numerics import LOCK, Kernel, compiler, stamp, working_seconds
 
 ROOT = Path(__file__).resolve().parents[3]
 NJIT = "from nested_agents.core.numerics import njit\n"
@@ -116,6 +116,25 @@ def test_kernels_for_several_types_are_compiled_at_once(
     assert [process.communicate()[0].strip() for process in begun] == [*values.values()]
     from_cache = asking(*values).communicate()[0]
     assert from_cache.split() == [*values.values()]
+
+
+def test_the_clock_of_durations_stops_during_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+
+    def prepared(kernel: Kernel, args: tuple[object, ...]) -> object:
+        now[0] += 5.0
+        return kernel.py_func
+
+    def run() -> str:
+        now[0] += 1.0
+        return "result"
+
+    monkeypatch.setattr(compiler, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(Kernel, "_prepared", prepared)
+    kernel = Kernel(run, {})
+    begin = working_seconds()
+    assert [kernel(), kernel()] == ["result", "result"]
+    assert (now[0], working_seconds() - begin) == (7.0, 2.0)
 
 
 def test_what_cannot_be_compiled_apart_is_compiled_all_the_same(

@@ -41,7 +41,7 @@ class MonteCarlo(Learner):
         np.add.at(self.theta, self.rows, step[:, None] * self.rules.features(states))
         return self.theta.size
 
-class Favourite(EvaluatorSettings):
+class Favorite(EvaluatorSettings):
     action: int = 1
 
     def build(self, problem):
@@ -72,7 +72,7 @@ TABLE = {
     "kind": "mine.py:MonteCarlo",
     "step_size": 0.25,
     "exploration": {"kind": "mine.py:Least"},
-    "decision": {"evaluator": {"kind": "mine.py:Favourite", "action": 3}},
+    "decision": {"evaluator": {"kind": "mine.py:Favorite", "action": 3}},
 }
 
 

@@ -22,30 +22,30 @@ class Cart:
     class Settings(CartSettings):
         wheels: int = 2
 
-    def __init__(self, settings, colour):
-        self.wheels, self.load, self.colour = settings.wheels, settings.load, colour
+    def __init__(self, settings, color):
+        self.wheels, self.load, self.color = settings.wheels, settings.load, color
 
-def made(colour, *, load: float = 1.0):
-    return "made", colour, load
+def made(color, *, load: float = 1.0):
+    return "made", color, load
 
 class Bare:
-    def __init__(self, settings, colour):
-        self.colour = colour
+    def __init__(self, settings, color):
+        self.color = color
 
 class Greedy:
     class Settings(CartSettings):
         pass
 
-    def __init__(self, settings, colour, load):
-        self.colour = colour
+    def __init__(self, settings, color, load):
+        self.color = color
 
 class Foreign:
     class Settings(Settings):
         wheels: int = 2
 
 class Built(CartSettings):
-    def build(self, colour):
-        return self.load, colour
+    def build(self, color):
+        return self.load, color
 
 NUMBER = 3
 """
@@ -58,8 +58,8 @@ class CartSettings(PartSettings):
 class RailSettings(CartSettings):
     kind: str = "rail"
 
-    def build(self, colour: str) -> object:
-        return "rail", colour
+    def build(self, color: str) -> object:
+        return "rail", color
 
 
 @pytest.fixture
@@ -134,7 +134,7 @@ def test_a_class_with_settings_of_its_own_gets_them(carts: SettingsRegistry) -> 
     with Sources(texts={"mine.py": CARTS}).active():
         model = carts.model("mine.py:Cart")
         cart = model(wheels=4).build("red")
-        assert (cart.wheels, cart.load, cart.colour) == (4, 1.0, "red")
+        assert (cart.wheels, cart.load, cart.color) == (4, 1.0, "red")
         with pytest.raises(SettingsError, match="legs = 2: unknown key"):
             model(legs=2)
 

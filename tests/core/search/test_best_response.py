@@ -204,7 +204,7 @@ def test_other_teammate_models_are_refused(world, rules) -> None:
 
 
 class InStep(Paid):
-    """Rewards every pair of neighbouring agents that do the same."""
+    """Rewards every pair of neighboring agents that do the same."""
 
     def rewards(self, joint: np.ndarray) -> np.ndarray:
         return (joint[:, 1:] == joint[:, :-1]).mean(axis=1)

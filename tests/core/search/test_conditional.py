@@ -67,7 +67,7 @@ def test_sampling_refuses_it():
         team_of("sampling")
 
 
-def test_neighbours_consider_each_other_and_are_told_nothing():
+def test_neighbors_consider_each_other_and_are_told_nothing():
     scenario, team = team_of(topology="simultaneous")
     seen = []
     original = fuzzy(team).evaluator.values

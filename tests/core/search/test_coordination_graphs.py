@@ -110,7 +110,7 @@ def test_what_is_too_wide_is_refused_before_anything_is_allocated():
     scopes = pairwise(nx.complete_graph(40))
     with pytest.raises(ValueError, match=r"width 39 of the coordination graph takes tables of 4"):
         Elimination(scopes, 40, 4)
-    with pytest.raises(ValueError, match="an agent with 39 neighbours"):
+    with pytest.raises(ValueError, match="an agent with 39 neighbors"):
         MaxPlus([tuple(range(40))], 40, 4)
 
 

@@ -33,7 +33,7 @@ def partitions_of(membership: str) -> list[Partition]:
 
 
 def states_of(rng: np.random.Generator, m: int, d: int = 4) -> np.ndarray:
-    """States inside and outside the ranges, some of them exactly on centres."""
+    """States inside and outside the ranges, some of them exactly on centers."""
     states = rng.uniform(-4.0, 4.0, (m, d))
     states[: m // 3] = rng.choice([-2.2, -1.0, 0.0, 0.5, 1.0, 2.0], (m // 3, d))
     return states

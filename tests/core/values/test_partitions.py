@@ -19,12 +19,12 @@ SHAPES = ("triangular", "sigmoid")
 def partitions(draw: st.DrawFn, flattest: float = 1.0) -> Partition:
     gaps = draw(st.lists(st.floats(1e-2, 1e2), min_size=1, max_size=14))
     start = draw(st.floats(-1e2, 1e2))
-    centres = start + np.concatenate([[0.0], np.cumsum(gaps)])
+    centers = start + np.concatenate([[0.0], np.cumsum(gaps)])
     closing = draw(st.none() | st.floats(1e-2, 1e2))
-    period = 0.0 if closing is None else float(centres[-1] - centres[0] + closing)
+    period = 0.0 if closing is None else float(centers[-1] - centers[0] + closing)
     steepness = draw(st.floats(flattest, 100.0))
     shape = draw(st.sampled_from(SHAPES))
-    return Partition(tuple(map(float, centres)), shape, period, steepness)
+    return Partition(tuple(map(float, centers)), shape, period, steepness)
 
 
 def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
@@ -35,8 +35,8 @@ def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
 
 
 def places(partition: Partition) -> np.ndarray:
-    """Values around, on, between and far from the centres."""
-    c = np.array(partition.centres)
+    """Values around, on, between and far from the centers."""
+    c = np.array(partition.centers)
     span = c[-1] - c[0]
     some = [c, 0.5 * (c[1:] + c[:-1]), c[0] + span * np.linspace(-3, 4, 41), [-1e6, 1e6]]
     return np.concatenate(some)
@@ -53,9 +53,9 @@ def test_strengths_are_a_partition_of_unity(partition: Partition, more: list[flo
 @given(partitions())
 @settings(max_examples=200)
 def test_strengths_are_those_of_the_reference(partition: Partition) -> None:
-    x, centres = places(partition), np.array(partition.centres)
-    # Where centres lie close together far from 0, exponents lose digits.
-    rounding = 4e-16 * partition.steepness * np.abs(centres).max() / np.diff(centres).min()
+    x, centers = places(partition), np.array(partition.centers)
+    # Where centers lie close together far from 0, exponents lose digits.
+    rounding = 4e-16 * partition.steepness * np.abs(centers).max() / np.diff(centers).min()
     expected = pytest.approx(oracle.strengths(partition, x), rel=0, abs=1e-12 + rounding)
     assert partition.strengths(x) == expected
 
@@ -70,8 +70,8 @@ def test_active_rules_have_the_same_strengths(partition: Partition) -> None:
 @given(partitions().filter(lambda p: p.period), st.integers(-3, 3))
 @settings(max_examples=200)
 def test_a_circle_closes(partition: Partition, turns: int) -> None:
-    # The seam of the period in use lies opposite the middle of the centres.
-    seam = 0.5 * (partition.centres[0] + partition.centres[-1] - partition.period)
+    # The seam of the period in use lies opposite the middle of the centers.
+    seam = 0.5 * (partition.centers[0] + partition.centers[-1] - partition.period)
     seam += turns * partition.period
     step = 1e-12 * max(1.0, abs(seam), partition.period)
     before, after = partition.strengths(np.array([seam - step, seam + step]))
@@ -100,10 +100,10 @@ def test_strengths_are_continuous(partition: Partition) -> None:
 
 @pytest.mark.parametrize("count", range(2, 16))
 @pytest.mark.parametrize("periodic", [False, True])
-def test_triangles_peak_at_their_centres(count: int, periodic: bool) -> None:
+def test_triangles_peak_at_their_centers(count: int, periodic: bool) -> None:
     partition = Partition.of(Variable("x", "rad", -pi, pi, periodic), "triangular", count)
-    at_centres = partition.strengths(np.array(partition.centres))
-    assert at_centres == pytest.approx(np.eye(count), abs=1e-14)
+    at_centers = partition.strengths(np.array(partition.centers))
+    assert at_centers == pytest.approx(np.eye(count), abs=1e-14)
     assert (partition.strengths(np.linspace(-9, 9, 999)) > 0).sum(axis=1).max() == 2
 
 
@@ -127,14 +127,14 @@ def test_two_sigmoids_are_equation_6() -> None:
 
 
 def test_three_sigmoids_by_hand() -> None:
-    # Centres 0, 2, 4, boundaries 1 and 3, slope 2 ln 3 / 2 = ln 3. At s = 2 both boundaries are
+    # Centers 0, 2, 4, boundaries 1 and 3, slope 2 ln 3 / 2 = ln 3. At s = 2 both boundaries are
     # one away: S(2 - 1) = 1 / (1 + 1/3) = 3/4, S(2 - 3) = 1 / (1 + 3) = 1/4.
     partition = Partition((0.0, 2.0, 4.0), "sigmoid", steepness=2.0 * np.log(3.0))
     assert partition.strengths(np.array(2.0)) == pytest.approx([0.25, 0.5, 0.25], abs=1e-15)
 
 
 def test_triangles_by_hand() -> None:
-    # On a circle of period 8 with centres 0, 2, 4 the last gap runs from 4 to 8: 5 is a quarter in.
+    # On a circle of period 8 with centers 0, 2, 4 the last gap runs from 4 to 8: 5 is a quarter in.
     partition = Partition((0.0, 2.0, 4.0), "triangular", period=8.0)
     x = np.array([0.5, 5.0, -3.0, 13.0, 8.0])
     expected = [[0.75, 0.25, 0], [0.25, 0, 0.75], [0.25, 0, 0.75], [0.25, 0, 0.75], [1, 0, 0]]
@@ -148,18 +148,18 @@ def test_strengths_keep_the_shape_of_their_argument() -> None:
 
 
 @pytest.mark.parametrize(
-    ("variable", "count", "centres"),
+    ("variable", "count", "centers"),
     [
         (Variable("x", "m", 0.0, 4.0), None, (0.0, 1.0, 2.0, 3.0, 4.0)),
         (Variable("x", "m", 0.0, 4.0), 3, (0.0, 2.0, 4.0)),
-        (Variable("x", "m", 0.0, 4.0, centres=(1.0, 3.0)), None, (1.0, 3.0)),
-        (Variable("x", "m", 0.0, 4.0, centres=(1.0, 3.0)), 3, (0.0, 2.0, 4.0)),
+        (Variable("x", "m", 0.0, 4.0, centers=(1.0, 3.0)), None, (1.0, 3.0)),
+        (Variable("x", "m", 0.0, 4.0, centers=(1.0, 3.0)), 3, (0.0, 2.0, 4.0)),
         (Variable("x", "rad", 0.0, 4.0, True), 4, (0.0, 1.0, 2.0, 3.0)),
     ],
 )
-def test_centres_of_a_variable(variable: Variable, count: int | None, centres: tuple) -> None:
+def test_centers_of_a_variable(variable: Variable, count: int | None, centers: tuple) -> None:
     partition = Partition.of(variable, "triangular", count)
-    assert partition.centres == centres
+    assert partition.centers == centers
     assert partition.period == (4.0 if variable.periodic else 0.0)
 
 

@@ -75,12 +75,26 @@ def test_products_are_added_once_and_in_any_spelling() -> None:
     assert base.features(state)[0, 6:10] == pytest.approx([0.2, 0.6, 0.05, 0.15], abs=1e-15)
 
 
-def test_a_variables_own_centres_may_differ_in_number() -> None:
+def test_centers_by_variable() -> None:
+    settings = RuleBaseSettings(memberships=4, centers={"x1": (-2.0, 0.5, 3.0)})
+    base = RuleBase.build(space_of(2), settings)
+    assert [partition.size for partition in base.partitions] == [4, 3]
+    assert base.partitions[1].centers == (-2.0, 0.5, 3.0)
+
+
+@pytest.mark.parametrize("centers", [{"x2": (0.0, 1.0)}, {"x1": (0.0,)}, {"x1": (1.0, 0.0)}])
+def test_unsuitable_centers_are_refused_with_their_key(centers: dict) -> None:
+    (name,) = centers
+    with pytest.raises(ValueError, match=rf"^learner\.rule_base\.centers\.{name}: "):
+        RuleBase.build(space_of(2), RuleBaseSettings(centers=centers))
+
+
+def test_a_variables_own_centers_may_differ_in_number() -> None:
     space = StateSpace(
         "demo",
         (
-            Variable("x", "m", 0.0, 1.0, centres=(0.0, 0.5, 1.0)),
-            Variable("y", "rad", -1.0, 1.0, periodic=True, centres=(-0.5, 0.5)),
+            Variable("x", "m", 0.0, 1.0, centers=(0.0, 0.5, 1.0)),
+            Variable("y", "rad", -1.0, 1.0, periodic=True, centers=(-0.5, 0.5)),
         ),
     )
     assert RuleBase.build(space, RuleBaseSettings(order=2)).sizes == (6,)
@@ -205,10 +219,10 @@ def sigmoid(x: float) -> float:
     return float(1.0 / (1.0 + np.exp(-x)))
 
 
-def sigmoid_degrees(x: float, centres: tuple[float, ...], steepness: float) -> list[float]:
+def sigmoid_degrees(x: float, centers: tuple[float, ...], steepness: float) -> list[float]:
     """Return the membership degrees of Eq. 6 for evenly spaced centers."""
     falls = [1.0]
-    for left, right in pairwise(centres):
+    for left, right in pairwise(centers):
         falls.append(sigmoid(steepness / (right - left) * (x - (left + right) / 2)))
     falls.append(0.0)
     return [before - after for before, after in pairwise(falls)]
@@ -217,14 +231,14 @@ def sigmoid_degrees(x: float, centres: tuple[float, ...], steepness: float) -> l
 def test_sigmoid_products_equal_sums_over_single_rules() -> None:
     # Three terms that overlap, of one, two and three variables with 2, 3 and 4 functions: a factor
     # that is left out, taken twice or from the wrong variable changes the value.
-    centres = [(0.0, 1.0), (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0, 2.0)]
+    centers = [(0.0, 1.0), (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0, 2.0)]
     terms = [(1,), (0, 2), (0, 1, 2)]
-    base = RuleBase([Partition(c, "sigmoid", steepness=6.0) for c in centres], terms, n_own=1)
+    base = RuleBase([Partition(c, "sigmoid", steepness=6.0) for c in centers], terms, n_own=1)
     theta = np.random.default_rng(3).normal(size=base.n_rules)
     states = np.array([[0.2, 0.5, 0.75], [0.9, -0.1, 0.3], [0.45, 0.65, -0.6]])
     features = []
     for state in states.tolist():
-        degrees = [sigmoid_degrees(x, c, 6.0) for x, c in zip(state, centres, strict=True)]
+        degrees = [sigmoid_degrees(x, c, 6.0) for x, c in zip(state, centers, strict=True)]
         rules = [product(*(degrees[j] for j in term)) for term in terms]
         features.append([float(np.prod(rule)) for of_term in rules for rule in of_term])
     expected = np.array(features) @ theta

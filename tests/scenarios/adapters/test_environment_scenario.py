@@ -301,7 +301,7 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
         (lambda: GymnasiumSettings(id="Pendulum-v99").build(), "scenario.id = 'Pendulum-v99'"),
         (lambda: GymnasiumSettings(id="Pendulum-v1", actions=1), "actions = 1"),
         (lambda: GymnasiumSettings(id="CartPole").build(), "'CartPole': .* such as CartPole-v1"),
-        (lambda: GymnasiumSettings(id="CartPole-v1", centres={"o0": (1, 0)}).build(), "-v1': var"),
+        (lambda: GymnasiumSettings(id="CartPole-v1", centers={"o0": (1, 0)}).build(), "-v1': var"),
         (lambda: PettingZooSettings(id="no/module").build(), "nested-agents has the extras mpe"),
         (lambda: PettingZooSettings(id="json").build(), "scenario.id = 'json'"),
         (lambda: from_gymnasium(Odd(IMAGE)), r"images of shape \(8, 8, 3\)"),
@@ -315,8 +315,8 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
         (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "one for each of 2 bodies"),
         (lambda: from_gymnasium(Carts(), ranges={"b": (0.0, 1.0)}), r"ranges\.b: no such"),
         (lambda: from_gymnasium(Carts(), ranges={"o0": (1.0, 0.0)}), "the lower end first"),
-        (lambda: from_gymnasium(Carts(), centres={"b": (0.0, 1.0)}), r"centres\.b: no such"),
-        (lambda: from_gymnasium(Carts(), centres={"o0": (1.0, 0.0)}), "centres .* must increase"),
+        (lambda: from_gymnasium(Carts(), centers={"b": (0.0, 1.0)}), r"centers\.b: no such"),
+        (lambda: from_gymnasium(Carts(), centers={"o0": (1.0, 0.0)}), "centers .* must increase"),
         (lambda: from_gymnasium(Carts(), success={"b": (0.0, 1.0)}), r"success\.b: no such"),
         (lambda: from_gymnasium(Carts(), success={"o0": 3.0}), "o0 must be a range"),
         (lambda: from_gymnasium(Carts(), success={"return": (0, 1)}), "return must be a number"),
@@ -420,15 +420,15 @@ def test_tables_and_discrete_observations() -> None:
     names = [v.name for v in from_gymnasium(Odd(named)).state_space.variables]
     assert names == ["height", "side0", "side1"]
     (variable,) = from_gymnasium(Odd(Discrete(3))).state_space.variables
-    assert variable.centres == (0.0, 1.0, 2.0)
+    assert variable.centers == (0.0, 1.0, 2.0)
 
 
-def test_centres_of_membership_functions_are_given_by_name() -> None:
+def test_centers_of_membership_functions_are_given_by_name() -> None:
     fine = (-1.0, -0.1, 0.0, 0.1, 1.0)
     world = from_gymnasium(
-        Odd(Box(-1.0, 1.0, (2,))), angles={"turn": 1}, centres={"o0": fine, "turn": (-0.1, 0.1)}
+        Odd(Box(-1.0, 1.0, (2,))), angles={"turn": 1}, centers={"o0": fine, "turn": (-0.1, 0.1)}
     )
-    assert [variable.centres for variable in world.state_space.variables] == [fine, (-0.1, 0.1)]
+    assert [variable.centers for variable in world.state_space.variables] == [fine, (-0.1, 0.1)]
 
 
 def test_check_and_run_say_it_in_one_line(

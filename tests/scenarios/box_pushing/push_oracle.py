@@ -71,7 +71,7 @@ def push_one(robots, box, twists, choices, seconds, model):
 def _near(
     pose: FloatArray, box: FloatArray, model: PushModel
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Return distance, outward normal and nearest point from the box's centre, world frame."""
+    """Return distance, outward normal and nearest point from the box's center, world frame."""
     turn = np.array([[np.cos(box[2]), -np.sin(box[2])], [np.sin(box[2]), np.cos(box[2])]])
     x, y = turn.T @ (pose[:2] - box[:2])
     distance, nx, ny, px, py = surface_numpy(model.shape, x, y)

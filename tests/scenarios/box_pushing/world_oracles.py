@@ -41,15 +41,15 @@ def ray_numpy(shape: BoxShape, x: float, y: float, dx: float, dy: float, reach: 
     A step as long as the distance to the surface never passes through it, so the march converges
     on the first hit; a grazing ray may take many steps and is given up after 2000.
     """
-    travelled = 0.0
+    traveled = 0.0
     for _ in range(2000):
-        distance = surface_numpy(shape, x + travelled * dx, y + travelled * dy)[0]
+        distance = surface_numpy(shape, x + traveled * dx, y + traveled * dy)[0]
         if distance <= 1e-10:
             break
-        travelled += distance
-        if travelled >= reach:
+        traveled += distance
+        if traveled >= reach:
             return reach
-    return travelled
+    return traveled
 
 
 def infrared_readings_numpy(
@@ -74,7 +74,7 @@ def infrared_readings_numpy(
             "linear": 1.0 - distance / spec.reach,
             "binary": 1.0,
         }
-        out[r, k] = near[spec.normalisation] if distance < spec.reach else 0.0
+        out[r, k] = near[spec.normalization] if distance < spec.reach else 0.0
     return out
 
 

@@ -248,7 +248,7 @@ def greedy_hands(self: Any, joint_action: Any) -> Any:
 
 def angle_out_of_range(self: Any, *args: Any) -> None:
     LineUp.__init__(self, LineUpSettings())
-    angle = replace(LEAD, low=-0.01, high=0.01, centres=(), periodic=True)
+    angle = replace(LEAD, low=-0.01, high=0.01, centers=(), periodic=True)
     self.state_space = StateSpace("line-up", (self.state_space.variables[0], angle), n_own=1)
 
 
@@ -493,7 +493,7 @@ def wrong_way(prediction: Any, agent: int, joint_actions: Any) -> Any:
     return -prediction.states(agent, joint_actions)
 
 
-def in_millimetres(prediction: Any, agent: int, joint_actions: Any) -> Any:
+def in_millimeters(prediction: Any, agent: int, joint_actions: Any) -> Any:
     return 1000 * prediction.states(agent, joint_actions)
 
 
@@ -502,7 +502,7 @@ def nothing_moves(self: Any) -> Any:
     return LineUpPrediction(np.repeat(self._places[:, None], 4, axis=1))
 
 
-def millimetres(self: Any) -> Any:
+def millimeters(self: Any) -> Any:
     return 1000 * np.stack([self._places, self._places - self._places.mean()], axis=1)
 
 
@@ -723,13 +723,13 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
 WARNED: dict[str, tuple[Callable[[], Scenario], str]] = {
     "several periods": (perceiving(per_period), "per_period is predicted no better than by"),
     "predicted the wrong way": (inexact(wrong_way), "distance is predicted no better than by"),
-    "predicted in millimetres": (inexact(in_millimetres), "lead is predicted no better than"),
+    "predicted in millimeters": (inexact(in_millimeters), "lead is predicted no better than"),
     "predicted as it is": (
         inexact(predict=nothing_moves),
         "distance is predicted no better than by persistence",
     ),
-    "variables in millimetres": (
-        inexact(lambda p, i, a: 1000 * p.states(i, a), _states=millimetres),
+    "variables in millimeters": (
+        inexact(lambda p, i, a: 1000 * p.states(i, a), _states=millimeters),
         "distance exceeds its range by more than 10 times its width",
     ),
     "rewards of something else": (

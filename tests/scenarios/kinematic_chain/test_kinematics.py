@@ -31,7 +31,7 @@ def test_a_thousand_postures() -> None:
 def test_by_hand() -> None:
     places = forward_kinematics(np.array([np.pi / 2, -np.pi / 2]), 0.5)
     assert places == pytest.approx(np.array([[0, 0], [0, 0.5], [0.5, 0.5]]))
-    # The tip is half a metre up and to the right of the base, and half a metre right of joint 2.
+    # The tip is half a meter up and to the right of the base, and half a meter right of joint 2.
     assert jacobian(places) == pytest.approx(np.array([[-0.5, 0.5], [0.0, 0.5]]))
 
 

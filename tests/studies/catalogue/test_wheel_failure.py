@@ -41,7 +41,7 @@ SHORT = {
 def test_levels_recovery_and_area_by_hand() -> None:
     success = np.array([[1] * 6 + [0, 0, 1, 1, 1, 1, 1, 1], [1] * 6 + [0] * 8], dtype=float)
     steps = np.full(success.shape, 10.0)
-    course = FailureCourse(6, success, steps, (0, 1))
+    course = FailureCourse((6,), success, steps, (0, 1))
     assert {name: values.tolist() for name, values in course.measured.items()} == {
         "recovered": [1.0, 0.0],
         "cumulative_loss": [2.0, 8.0],
@@ -56,7 +56,7 @@ def test_loss_is_against_the_level_of_each_seed() -> None:
     before = [[1, 1, 1, 1, 1], [0, 1, 0, 1, 0]]
     after = [[0, 0, 0, 0, 0, 1, 1, 1, 1, 1], [0, 1, 0, 1, 0] * 2]
     success = np.hstack([before, after]).astype(float)
-    course = FailureCourse(5, success, np.full(success.shape, 3.0), (4, 9))
+    course = FailureCourse((5,), success, np.full(success.shape, 3.0), (4, 9))
     assert course.measured["cumulative_loss"].tolist() == [5.0, pytest.approx(0.0)]
     assert course.measured["recovered"].tolist() == [1.0, 1.0]
     assert course.measured["recovery_time"].tolist() == [5.0, 0.0]
@@ -122,7 +122,7 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
     assert [line.condition.rpartition(": ")[2] for line in analysis.table] == [
         "nothing", "weights", "self-model", "both",
     ] * 2  # fmt: skip
-    ends = {line.condition: float(line.estimates["end"].value) for line in analysis.table}
+    ends = {line.condition: float(line.estimates[AT_END].value) for line in analysis.table}
     assert ends["4 wheels, seized: both"] > 0.85
     assert ends["4 wheels, seized: nothing"] < 0.2
     gains = {gain.condition: gain for gain in analysis.differences[AT_END]}
@@ -138,8 +138,52 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
             arrays["success"][:] = 0
     analysis = analyse(results.frames())
     for line in analysis.table:
-        assert list(line.estimates) == ["before", "just after", "end"]
-    assert "Recovery is not measured without successes before the failure." in analysis.notes
+        assert list(line.estimates) == ["before", "just after", AT_END]
+    text = " ".join(" ".join(analysis.notes).split())
+    assert "not measured for seeds without success before the failure: fault:" in text
+    with pytest.raises(SpecError, match="'recovered': no seed succeeded before a failure began"):
+        compare_conditions(results.frames(), "recovered")
+
+
+def test_a_comparison_names_the_seeds_without_success_before_the_failure() -> None:
+    results = wheel_failure(ENDS)
+    label = "4 wheels, seized, enabled=false"
+    results.training[label]["success"][:2] = 0
+    compared = compare_conditions(results.frames(), "recovered")
+    total = len(compared.groups[0].values["2 wheels, seized, enabled=false"])
+    assert len(compared.groups[0].values[label]) == total - 2
+    text = " ".join(" ".join(compared.notes).split())
+    assert f"without success before the failure, left out: {label}, 2 of {total}." in text
+
+
+def test_seeds_without_success_before_the_failure_do_not_recover() -> None:
+    success = np.zeros((3, 15))
+    success[0] = 1.0
+    success[1, :5] = 1.0
+    course = FailureCourse((5,), success, np.full(success.shape, 3.0), (0, 1, 2))
+    for name, values in course.measured.items():
+        assert np.isnan(values).tolist() == [False, False, True], name
+    line = Course("fault", "both", ((5, None),), course, 3).summary
+    assert float(line.estimates["recovered"].value) == 0.5
+    assert float(line.estimates["cumulative loss [episodes]"].value) == 5.0
+
+
+def test_a_team_that_recovers_between_failures_and_collapses_has_not_recovered() -> None:
+    success = np.ones((2, 30))
+    success[:, 5:7] = 0.0
+    success[0, 20:] = 0.0
+    course = FailureCourse((5, 20), success, np.full(success.shape, 3.0), (0, 1))
+    assert course.measured["recovered"].tolist() == [0.0, 1.0]
+    assert course.measured["recovery_time"].tolist() == [25.0, 15.0]
+
+
+def test_a_level_after_a_failure_needs_as_many_episodes_as_all_levels() -> None:
+    success = np.ones((2, 16))
+    course = FailureCourse((6,), success, success, (0, 1))
+    short = Course("fault", "both", ((6, 14),), course, 3).summary
+    assert "failure ends [episode]" in short.estimates
+    assert "after its end" not in short.estimates
+    assert "after its end" in Course("fault", "both", ((6, 11),), course, 3).summary.estimates
 
 
 @pytest.mark.parametrize(

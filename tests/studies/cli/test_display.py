@@ -76,7 +76,7 @@ def test_results_are_shown_with_the_commands_that_follow(tmp_path, capsys):
 
 
 ORDERS = "\x1b]0;owned\x07\x1b[31m[red]x\u202e\x9b31m"
-"""A label that would name the window, colour the text and reverse it."""
+"""A label that would name the window, color the text and reverse it."""
 WRITTEN = r"\x1b]0;owned\x07\x1b[31m[red]x\u202e\x9b31m"
 PUBLISHED = Path(na.__file__).parents[1] / "research/results/from-eight-128.json"
 

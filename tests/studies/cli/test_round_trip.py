@@ -116,6 +116,25 @@ def test_a_table_without_its_description_gives_the_same_verdict(study: Path, tmp
     assert verdict(asked) == verdict(read, measure="success")
 
 
+def test_a_swept_column_must_agree_with_the_description(tmp_path: Path) -> None:
+    directory = tmp_path / "out"
+    spec = Spec.of(
+        {"seeds": 2, "episodes": 2, "steps": 5, "sweep": {"topology": ["chain", "star"]}}
+    )
+    with made_up.opened(directory, spec) as store:
+        for trial in trials_of(spec):
+            save(store, trial, made_up.measure(trial), 2.5)
+    assert main(["export", str(directory), "--out", str(tmp_path)]) == 0
+    path = tmp_path / "episodes.csv"
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    table.loc[1, "topology"] = "star"
+    table.to_csv(path, index=False)
+    with pytest.raises(
+        SpecError, match=r"line 3: topology = 'star': must be 'chain', .*study.json"
+    ):
+        na.load(path)
+
+
 def test_mixed_swept_values_are_written_and_read(tmp_path: Path, capsys) -> None:
     pytest.importorskip("pyarrow", reason="extra [parquet]")
     spec = Spec.of(

@@ -66,12 +66,12 @@ def test_parted_relations_and_failures_are_shown(said, tmp_path) -> None:
     assert "dotted arrows: communication only; dashed frame: messages fail" in third
 
 
-def test_a_file_of_a_topology_does_not_part_relations(said, tmp_path) -> None:
+def test_a_topology_file_cannot_set_relations(said, tmp_path) -> None:
     teams = tmp_path / "teams.toml"
     teams.write_text('members = ["robot1.left", "robot1.right"]\ncommunication = "none"\n')
     status, _, err = said("show", str(teams))
     assert status == 2
-    assert "communication must stand in the [topology] table of the spec" in err
+    assert "communication belongs in the [topology] table of the spec" in err
 
 
 @pytest.mark.parametrize(

@@ -295,7 +295,7 @@ def test_the_formula_stands_beside_what_is_not_measured(said, form: str) -> None
     assert "65" in out
     joint = sum(4**k for k in range(1, 66))
     assert {"table": "1.815e39", "latex": r"1.815\times 10^{39}"}.get(form, str(joint)) in out
-    assert err.startswith("measuring, first compiling what is not: no steps of more than a second")
+    assert err.startswith("Measuring. Code is compiled first; steps of over about a second")
     assert err.count("\n") == 1
     assert "0 of 0" not in out
 

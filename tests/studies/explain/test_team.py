@@ -212,7 +212,7 @@ PARTITIONS = [
 ]
 VARIABLES = [
     Variable("lamp", "1", 0.0, 1.0),
-    Variable("gap", "m", 0.0, 1.0, centres=(0.0, 0.3, 1.0), labels=("touching", "near", "far")),
+    Variable("gap", "m", 0.0, 1.0, centers=(0.0, 0.3, 1.0), labels=("touching", "near", "far")),
     Variable("turn", "rad", -np.pi, np.pi, periodic=True),
     Variable("speed", "m/s", 0.0, 1.0),
 ]
@@ -227,7 +227,7 @@ def theta_for(rules):
 
 
 def corners():
-    return np.array(list(product(*(p.centres for p in PARTITIONS))))
+    return np.array(list(product(*(p.centers for p in PARTITIONS))))
 
 
 def test_the_parts_add_up_to_f():

@@ -126,7 +126,7 @@ def test_other_episodes_are_chosen(page):
     assert page.locator("#seed option").all_inner_texts() == ["0", "1"]  # seed 2 failed
     page.select_option("#seed", "1")
     page.wait_for_function("() => document.getElementById('moment').textContent.includes('of 33')")
-    assert page.locator("#episode option").all_inner_texts() == ["1 (first)", "4 (last)"]
+    assert page.locator("#episode option").all_inner_texts() == ["0 (first)", "3 (last)"]
 
 
 def test_copies_can_be_read_elsewhere(page):
@@ -172,7 +172,7 @@ def test_in_print_are_the_whole_episode_and_all_failures_but_no_controls(page):
     page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
     assert not page.locator("#play").is_visible()
     assert page.locator("#stage").is_visible()
-    assert page.inner_text("#which") == "default, seed 0, training episode 4"
+    assert page.inner_text("#which") == "default, seed 0, training episode 3"
     assert page.inner_text("#moment").startswith("step 30 of 30")
     assert page.get_by_text("RuntimeError: <off & away>").last.is_visible()
 

@@ -1,5 +1,6 @@
 import re
 
+import pytest
 from matplotlib.figure import Figure
 
 from nested_agents.studies.report.pictures import pictures
@@ -20,6 +21,21 @@ def test_a_figure_stands_in_a_page_and_can_be_taken_away():
     assert "a &lt; b &amp; c" in picture.svg
     assert "<metadata>" not in picture.svg
     assert picture.pdf.startswith("JVBERi")  # %PDF-
+
+
+def test_a_panel_on_its_own_keeps_the_axis_that_it_shares_with_its_row():
+    figure = Figure(layout="constrained")
+    (left, _), (_, spare) = figure.subplots(2, 2, sharey=True)
+    left.set_ylabel("success")
+    spare.set_visible(False)
+    (picture,) = pictures({"row": figure})
+    parts = [panel.parts for panel in picture.panels]
+    assert [len(own) for own in parts] == [1, 2, 1], "the first of each row has its axis"
+    x, _, width, _ = (float(value) for value in parts[1][0][1].split())
+    label = left.yaxis.label.get_window_extent()
+    scale = 72.0 / figure.dpi
+    assert x <= scale * label.x0 <= scale * label.x1 <= x + width
+    assert parts[1][1][0] == pytest.approx(width, abs=0.1), "side by side"
 
 
 def test_equal_figures_are_equal_bytes():

@@ -18,7 +18,7 @@ def read(directory, **options):
 def test_first_and_last_of_all_finished_trials(kept, tmp_path):
     found = read(kept(tmp_path, done=5))
     assert len(found.episodes) == 10
-    assert [e["number"] for e in found.episodes[:2]] == [1, 4]
+    assert [e["number"] for e in found.episodes[:2]] == [0, 3]
     assert (len(found.scenes), found.remarks) == (1, [])
     assert json.loads(json.dumps(found.episodes)) == found.episodes
 

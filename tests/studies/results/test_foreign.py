@@ -82,6 +82,13 @@ def test_several_rows_of_a_run_are_refused_unless_their_items_are_named(scores) 
         read(scores, NAMES._replace(item=None))
 
 
+def test_a_repeated_seed_is_shown_as_the_file_has_it(tmp_path) -> None:
+    path = tmp_path / "episodes.csv"
+    path.write_text("condition,seed,phase,episode,steps\n" + "a,0,training,0,5\n" * 2)
+    with pytest.raises(SpecError, match="condition = 'a', phase = 'training', seed = 0, episode"):
+        na.load(path)
+
+
 def test_columns_of_conditions_are_crossed(scores) -> None:
     table = scores.assign(model=np.where(scores["run"] < 4, "small", "large"))
     roles = ROLES | {"condition": ["topology", "model"]}
@@ -219,7 +226,7 @@ def test_a_file_and_a_frame_have_the_same_defaults(scores, tmp_path) -> None:
     [
         ("", "", "holds no table of scores: no columns"),
         ("a,b\n1,2\n", "", "columns: condition = 'condition': no such column; known: a, b"),
-        ("condition,score\na,1\n", "colour=b", "must be ROLE=COLUMN"),
+        ("condition,score\na,1\n", "color=b", "must be ROLE=COLUMN"),
         ("condition,score\na,\n", "", "score = 'score': no row has one"),
     ],
 )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.results import curves, laws, samples
+from nested_agents.studies.laws import curves, fitting, samples
 from nested_agents.studies.results.analysis import verdict_lines
 from nested_agents.studies.results.differences import Difference, adjust
 from nested_agents.studies.results.notation import format_number
@@ -217,8 +217,8 @@ def test_told_exponents_are_found_as_often_as_promised() -> None:
         logs = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5
         others = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5 + least * np.log(sizes)
         both = [samples.of_numbers(sizes, np.exp(own)) for own in (others, logs)]
-        pair = [laws.fit(curves.POWER, sample, 2) for sample in both]
-        hits += laws.compare(*pair).p < 0.05
+        pair = [fitting.fit(curves.POWER, sample, 2) for sample in both]
+        hits += fitting.compare(*pair).p < 0.05
     assert 0.74 < hits / times < 0.88
 
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+import nested_agents as na
 from nested_agents.studies.results.permutation_tests import (
     BITS,
     EXACT,
@@ -18,7 +19,17 @@ from nested_agents.studies.results.permutation_tests import (
     holm,
     paired_permutation,
 )
-from nested_agents.studies.results.statistics import RESAMPLES, bootstrap, rate, rates
+from nested_agents.studies.results.statistics import (
+    PROBABILITY_RESAMPLES,
+    RESAMPLES,
+    bootstrap,
+    cliffs_delta,
+    probability_higher,
+    rate,
+    rates,
+    resample_weights,
+)
+from research import RESULTS
 
 RNG = np.random.default_rng(0)
 
@@ -295,3 +306,34 @@ def test_a_test_of_many_seeds_takes_little_memory() -> None:
     tracemalloc.stop()
     assert p == 0.75361  # as when all signs were drawn at once
     assert peak < 60e6
+
+
+def pairwise_probability(own, base):
+    """Return the probability of a higher value and its percentiles by all pairs of runs."""
+    won = 0.5 + 0.5 * np.sign(np.subtract.outer(own, base))
+    weights, base_weights = (
+        np.concatenate([*resample_weights(n_runs, PROBABILITY_RESAMPLES, seed)])
+        for seed, n_runs in enumerate(won.shape)
+    )
+    drawn = np.einsum("ri,ij,rj->r", weights, won, base_weights, optimize=True)
+    return won.mean(), *np.quantile(drawn, [0.025, 0.975])
+
+
+@pytest.mark.parametrize("name", ["scaling", "arms", "hierarchies"])
+def test_ranks_give_the_probabilities_of_all_pairs_on_published_tables(name) -> None:
+    for d in na.load(RESULTS / f"{name}.json").compare(measure="steps").differences:
+        own, base = d.values
+        pairs = np.sign(np.subtract.outer(own, base))
+        assert cliffs_delta(own, base) == d.cliffs_delta == pytest.approx(pairs.mean(), abs=1e-15)
+        if abs(pairs.mean()) < 1.0:
+            expected = pairwise_probability(own, base)
+            assert [*probability_higher([(own, base)])] == pytest.approx(expected, abs=1e-12)
+
+
+def test_no_matrix_of_all_pairs_of_runs_is_built() -> None:
+    values = np.random.default_rng(0).normal(size=(2, 30_000))
+    tracemalloc.start()
+    assert abs(cliffs_delta(*values)) < 0.02
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 20e6

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 import nested_agents as na
+from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.results.results import from_arrays
+from nested_agents.studies.scalability.report import analyze
 
 RESULTS = Path(__file__).parents[3] / "research" / "results"
 SCALING = RESULTS / "scaling.json"
@@ -75,6 +78,24 @@ def test_a_crossover_is_found_with_its_interval(table):
     assert (crossover.better, crossover.worse) == ("tree", "chain")
     assert 4.0 <= crossover.size.low < crossover.size.value < crossover.size.high <= 8.0
     assert "tree beats chain from" in report.analysis.paragraph
+
+
+def test_a_best_size_without_bound_is_said_in_words(tmp_path) -> None:
+    """Times fall as those of a serial fraction of 0.1, whose throughput has no maximum."""
+    columns = {str(n): {"scenario.robots": n} for n in (2, 4, 8, 16)}
+    rng = np.random.default_rng(0)
+    times = {
+        n: 200.0 * (0.1 + 0.9 / n) * rng.gamma(900.0, 1 / 900.0, (12, 1)) for n in (2, 4, 8, 16)
+    }
+    values = {
+        c: {"steps": times[own["scenario.robots"]], "success": np.ones((12, 1))}
+        for c, own in columns.items()
+    }
+    of_seeds = {c: range(12) for c in columns}
+    results = from_arrays({"evaluation": values}, of_seeds, {}, {}, columns, (SUCCESS,))
+    report = analyze(results, {}, None, None, None, None, "")
+    assert "inf" not in str(report.laws)
+    assert "more than 1" in report.analysis.paragraph
 
 
 def test_results_without_times_and_costs_have_no_speed_up(table):

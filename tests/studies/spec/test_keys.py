@@ -84,7 +84,7 @@ def the_key(name: str) -> Key:
     ("name", "kind", "default", "allowed", "unit"),
     [
         ("scenario.termination_radius", "number", "1.5", "> 0", "m"),
-        ("scenario.start", "text", '"medium"', '"easy", "medium", "hard"', ""),
+        ("scenario.start", "text", '"medium"', '"fixed", "easy", "medium", "hard"', ""),
         ("scenario.robots", "whole number", "2", ">= 1", ""),
         ("scenario.box.holes", "list of list of pair of number", "[]", "at least 3 of them", "m"),
         ("learner.rule_base.memberships", "whole number", "none", ">= 2, <= 15", ""),
@@ -131,4 +131,4 @@ def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert len(lines) <= 60
-    assert "[scenario.infrared]  reach, normalisation, decay, noise" in lines
+    assert "[scenario.infrared]  reach, normalization, decay, noise" in lines

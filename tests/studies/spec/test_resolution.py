@@ -16,7 +16,7 @@ from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
 
 ON_GRAPHS = ("variable-elimination", "max-plus")
-"""Evaluators that need neighbours."""
+"""Evaluators that need neighbors."""
 BUILT = [
     kind
     for kind in LEARNERS.built_in
@@ -196,3 +196,18 @@ def test_a_sweep_of_equal_values_names_its_key(sweep: dict[str, object], message
 def test_a_file_that_is_not_there_names_its_key(table: dict[str, object]) -> None:
     with pytest.raises(SpecError, match=r"^topology\.path = 'gone\.json': No such file or dir"):
         Spec.of(table)
+
+
+def test_keys_of_a_preset_return_to_their_defaults() -> None:
+    table = {"preset": "paper", "unset": ["learner.rule_base.memberships"]}
+    overrides = [{"name": "even", "unset": ["scenario.action_repeat"]}, {"name": "as it is"}]
+    changed, other = Spec.of({**table, "overrides": overrides}).conditions()
+    assert changed.settings.learner.rule_base.memberships is None
+    assert changed.settings.scenario.action_repeat == 8
+    assert other.settings.scenario.action_repeat == 1
+
+
+@pytest.mark.parametrize("key", ["learner.ridge", "scenario.kind.x", "learner.rule", "nothing", ""])
+def test_a_key_that_the_preset_does_not_set_cannot_be_unset(key: str) -> None:
+    with pytest.raises(SpecError, match=rf"^unset: .*{key!r}"):
+        Spec.of({"preset": "paper", "unset": [key]})

@@ -470,7 +470,7 @@ def test_a_class_stands_for_its_name_as_kind_of_a_table_too() -> None:
     assert table == plain({"scenario": LineUp})["scenario"] | {"carts": 2}
 
 
-def test_edges_beside_neighbours_have_no_table():
+def test_edges_beside_neighbors_have_no_table():
     with pytest.raises(SpecError, match="both edges and neighbors cannot be written in a spec"):
         plain(Hierarchy("abc", [("a", "b")], neighbors=[("a", "c")]), "topology")
 

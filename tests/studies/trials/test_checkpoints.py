@@ -28,7 +28,7 @@ TABLES = {
     "spread": {**MANY, "scenario": {"kind": "spread"}, "learner": {"kind": "mappo", **PPO}},
     "arm": {
         **MANY, "scenario": {"kind": "kinematic-chain", "joints": 3}, "steps": 40,
-        "learner": {"kind": "hierarchy-ppo", "normalised": "values", **PPO},
+        "learner": {"kind": "hierarchy-ppo", "normalized": "values", **PPO},
     },
     "box": {**MANY, "learner": {"kind": "ippo", **PPO}, "decisions": 1300, "steps": 60},
     "worlds by a loop": {

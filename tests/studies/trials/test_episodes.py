@@ -48,7 +48,7 @@ def test_names_of_other_columns_are_refused(name):
 def test_measures_can_be_written_down():
     assert measures_from(json.loads(json.dumps(tables((SUCCESS, ENERGY))))) == (SUCCESS, ENERGY)
     with pytest.raises(TypeError):
-        measures_from([{"colour": "red"}])
+        measures_from([{"color": "red"}])
 
 
 def transition(reward=0.5, terminated=False, **info):

@@ -14,7 +14,7 @@ def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
     gap = [v.name for v in scenario.state_space.variables].index("gap")
     begin = sum(p.size for p in partitions[:gap])
     fuzzy(team).learner.theta[:, begin : begin + partitions[gap].size] = slope * np.array(
-        partitions[gap].centres
+        partitions[gap].centers
     )
     fields = scenario.show_policy(
         lambda prediction: joint_of(team, scenario, explore=False, imagined=prediction),

@@ -83,7 +83,7 @@ def test_a_robot_that_drives_away_leaves_the_box() -> None:
     assert gaps[0] == pytest.approx(0.0512, abs=1e-9)
 
 
-def test_a_push_off_the_centre_turns_the_box_away() -> None:
+def test_a_push_off_the_center_turns_the_box_away() -> None:
     _, left, _ = ahead([[BEHIND, 0.06, 0.0]], 0.13, model(1))
     _, right, _ = ahead([[BEHIND, -0.06, 0.0]], 0.13, model(1))
     assert left[2] < -0.05
@@ -127,7 +127,7 @@ def test_a_joint_action_has_the_same_bits_alone_and_among_others(name: str) -> N
             np.testing.assert_array_equal(a[0], b[c])
 
 
-def test_it_predicts_the_world_within_millimetres() -> None:
+def test_it_predicts_the_world_within_millimeters() -> None:
     scenario = BoxPushing(BoxPushingSettings(start="easy"))
     rng = np.random.default_rng(1)
     errors, moves = [], []

@@ -57,7 +57,7 @@ def test_inertia_of_known_shapes() -> None:
 
 
 def test_friction_radius_of_known_shapes() -> None:
-    # Mean distance from the centre: (sqrt 2 + asinh 1) / 6 of a square's side, 2/3 of a radius.
+    # Mean distance from the center: (sqrt 2 + asinh 1) / 6 of a square's side, 2/3 of a radius.
     assert BOXES["square"].friction_radius == pytest.approx(0.2 * (sqrt(2) + np.arcsinh(1)) / 6)
     assert BOXES["circle"].friction_radius == pytest.approx(BOXES["circle"].radius * 2 / 3)
 
@@ -124,11 +124,11 @@ def test_pieces_make_up_the_polygon(seed: int, corners: int, window: bool, angle
 
 
 def _inertia(polygon: Polygon) -> float:
-    """Return the second polar moment of area about the centre by triangles, another way [m4]."""
-    centre = np.array(polygon.centroid.coords[0])
+    """Return the second polar moment of area about the center by triangles, another way [m4]."""
+    center = np.array(polygon.centroid.coords[0])
     total = 0.0
     for triangle in shapely.constrained_delaunay_triangles(polygon).geoms:
-        corners = np.asarray(triangle.exterior.coords)[:3] - centre
+        corners = np.asarray(triangle.exterior.coords)[:3] - center
         # A triangle's second moment is that of three thirds of its area at the edge middles.
         middles = (corners + np.roll(corners, 1, axis=0)) / 2
         total += triangle.area / 3 * float((middles**2).sum())

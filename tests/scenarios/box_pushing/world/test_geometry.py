@@ -100,8 +100,8 @@ def test_ray_equals_its_reference(x: float, y: float, angle: float, which: int) 
     reference = ray_numpy(shape, x, y, *direction, 0.3)
     if abs(got - reference) > 1e-7:
         # Only a ray that grazes the surface may be judged differently, or is given up beside it.
-        travelled = min(got, reference)
-        point = x + travelled * direction[0], y + travelled * direction[1]
+        traveled = min(got, reference)
+        point = x + traveled * direction[0], y + traveled * direction[1]
         assert abs(surface(shape, *point)[0]) < 0.3 / 2000
 
 

@@ -83,3 +83,15 @@ def test_refusals(start: str, robots: int, box: BoxSpec, word: str) -> None:
     with pytest.raises(ValueError, match=word) as error:
         place(start, np.random.default_rng(0), [ROBOT] * robots, box)
     assert "\n" not in str(error.value)
+
+
+def test_a_fixed_start_is_the_same_in_every_episode() -> None:
+    first, second = (
+        place("fixed", np.random.default_rng(seed), [ROBOT] * 2, BOXES["square"]) for seed in (0, 1)
+    )
+    for one, other in zip(first, second, strict=True):
+        np.testing.assert_array_equal(one, other)
+    robots, box, goal = first
+    np.testing.assert_allclose(goal - box, [1.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(robots[0, 1], -robots[1, 1])  # symmetric about the course
+    np.testing.assert_array_equal(robots[:, 2], 0.0)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.numerics import BoolArray, special
+from ..results.statistics import Array
 from .curves import BREAK, FLOOR, LOGISTIC, POWER, QUADRATIC, Curve
-from .statistics import Array
 
 MIN_SIZE = 1.0
 """Minimum size."""

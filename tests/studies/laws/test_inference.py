@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from nested_agents.studies.scalability.inference import (
+from nested_agents.studies.laws.inference import (
     mean_interval,
     ratio_interval,
     sign_change,

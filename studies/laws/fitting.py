@@ -30,10 +30,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.numerics import BoolArray, optimize, special
+from ..results.statistics import Array, Estimate
 from .curves import POWER, Curve
 from .drift import Drift, Mixture, drift
 from .samples import LOGIT, Sample, check_sizes
-from .statistics import Array, Estimate
 
 RESAMPLES = 400
 """Resamples of seeds, which estimate a standard error to 4%."""

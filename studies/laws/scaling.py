@@ -3,31 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS
 from ...core.numerics import pd
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
-from ..spec.tables import label_but
-from . import laws
-from .analysis import Summary
-from .comparison import title_of, values_of
-from .notation import format_estimate, format_number, format_p, wrapped
-from .permutation_tests import LEVEL, holm
-from .power import seeds_for
-from .power_text import APART
-from .results import Results
+from ..results.analysis import Summary
+from ..results.comparison import title_of, values_of
+from ..results.notation import format_estimate, format_number, format_p, wrapped
+from ..results.permutation_tests import LEVEL, holm
+from ..results.power import seeds_for
+from ..results.power_text import APART
+from ..results.results import Results
+from ..results.statistics import NOT_NEGATIVE, bootstrap
+from . import fitting
 from .samples import GEOMETRIC, of_numbers, of_rates, of_times
-from .statistics import NOT_NEGATIVE, Array, bootstrap
+from .size_axis import SizeAxis, check_size, columns_of
 
 WINDOW = 5
 """Episodes in a row whose mean success must reach a criterion."""
-MAX_SIZE = 1_000_000_000
-"""Maximum size that is fitted or predicted."""
 
 
 class Fitted(NamedTuple):
@@ -35,7 +31,7 @@ class Fitted(NamedTuple):
 
     group: str
     """Settings that the conditions have in common; empty if there are none."""
-    law: laws.Law | None
+    law: fitting.Law | None
     """None if there is no law, see `why`."""
     why: str = ""
     """Reason why there is no law, in one sentence."""
@@ -88,10 +84,27 @@ class ScalingLaw(NamedTuple):
         lines: list[str] = []
         for fitted in self.fits:
             lines += wrapped(_sentence(fitted, self.size))
+            lines += self._limited(fitted)
         lines += self._comparisons()
         for remark in self.remarks:
             lines += wrapped(remark)
         return tuple(lines)
+
+    def _limited(self, fitted: Fitted) -> list[str]:
+        """Return a sentence for each prediction that the range of the measure limits."""
+        if fitted.law is None:
+            return []
+        head = f"{fitted.group}: " if fitted.group else ""
+        lines = []
+        for n in self.predicted:
+            value = float(fitted.law.curve_at(np.array([float(n)]))[0])
+            limit = float(np.clip(value, *fitted.law.sample.bounds))
+            if value != limit:
+                lines += wrapped(
+                    f"{head}at {n} the law gives {format_number(value)}, outside "
+                    f"the range of {self.title}, so that {format_number(limit)} is predicted."
+                )
+        return lines
 
     def _comparisons(self) -> list[str]:
         """Return how exponents differ from that of the first group, of equal seeds and sizes."""
@@ -99,7 +112,7 @@ class ScalingLaw(NamedTuple):
         base = known[0] if known else None
         if base is None or not _is_line(base[1]):
             return []
-        pairs = [(g, laws.compare(law, base[1])) for g, law in known[1:] if _alike(law, base[1])]
+        pairs = [(g, fitting.compare(law, base[1])) for g, law in known[1:] if _alike(law, base[1])]
         if not pairs:
             return []
         lines = [f"Exponents, minus that of {base[0]}:"]
@@ -118,11 +131,11 @@ class ScalingLaw(NamedTuple):
         return lines
 
 
-def _is_line(law: laws.Law) -> bool:
+def _is_line(law: fitting.Law) -> bool:
     return law.curve.n_parameters == 2 and not law.sample.censored.any()
 
 
-def _alike(law: laws.Law, base: laws.Law) -> bool:
+def _alike(law: fitting.Law, base: fitting.Law) -> bool:
     """Return whether exponents can be compared seed by seed."""
     same_shape = law.sample.values.shape == base.sample.values.shape
     return _is_line(law) and same_shape and bool((law.sample.sizes == base.sample.sizes).all())
@@ -141,7 +154,7 @@ def _sentence(fitted: Fitted, size: str) -> str:
         inside = "inside" if e.low <= measured <= e.high else "outside"
         text += f"; {n:g} left out: predicted {format_estimate(e)}, "
         text += f"measured {format_number(measured)}, {inside}"
-    if law.sample.values.var(axis=0).max() <= laws.FLAT:
+    if law.sample.values.var(axis=0).max() <= fitting.FLAT:
         text += "; all seeds agree, so that intervals of parameters do not show how well it fits"
     return f"{text}."
 
@@ -180,86 +193,52 @@ def scaling_law(
         If there is no such measure, phase or key, the key is no number, a size is below 1 or not
         finite, or the criterion is no share.
     """
-    columns = columns_of(results)
-    key = size_key(columns, size)
-    sizes = {c: float(str(own[key])) for c, own in columns.items()}
-    for condition, n in sizes.items():
-        _check_size(key.rpartition(".")[2], n, f" (condition {condition!r})")
+    axis = SizeAxis.of(columns_of(results), size)
     for n in predict:
-        _check_size("predict", n)
-    if criterion is None:
-        phases = [phase] if phase else ["evaluation", "training"]
-        own = next((p for p in phases if p in results.phases), phases[0])
-        shown_as, values, own = values_of(results, measure, own)
-        samples: Mapping[str, tuple[pd.Series, pd.Series | None]] = {
-            c: (pd.Series(v), None) for c, v in values.items()
-        }
-        title = title_of(shown_as, own)
-    else:
-        samples = decisions_to_criterion(results, measure, criterion)
-        title = f"decisions to {format_number(criterion)} of {measure}"
-        shown_as, own = SUCCESS, ""
-    counts = _episodes(results, own) if shown_as.is_rate and criterion is None else {}
-    bounds = shown_as.bounds if criterion is None else NOT_NEGATIVE
-    groups: dict[str, list[str]] = {}
-    for condition in samples:
-        groups.setdefault(label_but(columns[condition], [key]), []).append(condition)
+        check_size("predict", n)
+    measured = (
+        _measured(results, measure, phase)
+        if criterion is None
+        else _until_criterion(results, measure, criterion)
+    )
     fits = []
-    for group, members in groups.items():
-        members.sort(key=sizes.__getitem__)
-        own_sizes = np.array([sizes[c] for c in members])
-        episodes = np.array([counts[c] for c in members]) if counts else None
-        fits.append(_fit(group, own_sizes, [samples[c] for c in members], episodes, bounds))
-    return ScalingLaw(title, key.rpartition(".")[2], tuple(fits), tuple(predict))
+    for group, sizes in axis.groups().items():
+        own = {condition: n for condition, n in sizes.items() if condition in measured.values}
+        if own:
+            fits.append(_fit(group, own, measured))
+    return ScalingLaw(measured.title, axis.name, tuple(fits), tuple(predict))
 
 
-def _check_size(name: str, size: float, where: str = "") -> None:
-    if not 1.0 <= size <= MAX_SIZE:
-        raise SpecError(f"{name} = {size:g}{where}: allowed are sizes from 1 to {MAX_SIZE:,}")
+class SizedValues(NamedTuple):
+    """Values that laws are fitted to, by condition."""
+
+    title: str
+    values: Mapping[str, pd.Series]
+    """By seed."""
+    bounds: tuple[float, float]
+    """Minimum and maximum of the measure."""
+    episodes: Mapping[str, float] = {}
+    """Number of episodes of a seed, if the values are rates."""
+    censored: Mapping[str, pd.Series] = {}
+    """For times to a criterion: whether each seed has not reached it."""
 
 
-def columns_of(results: Results) -> Mapping[str, Mapping[str, object]]:
-    """Return what distinguishes each condition; without columns it is its label."""
-    if any(results.columns.values()):
-        return results.columns
-    return {condition: {"condition": condition} for condition in results.columns}
+def _measured(results: Results, measure: str, phase: str | None) -> SizedValues:
+    """Return the means of seeds of a measure."""
+    phases = [phase] if phase else ["evaluation", "training"]
+    own = next((p for p in phases if p in results.phases), phases[0])
+    shown_as, values, own = values_of(results, measure, own)
+    series = {condition: pd.Series(each) for condition, each in values.items()}
+    episodes = _episodes(results, own) if shown_as.is_rate else {}
+    return SizedValues(title_of(shown_as, own), series, shown_as.bounds, episodes)
 
 
-def size_key(columns: Mapping[str, Mapping[str, object]], size: str | None = None) -> str:
-    """Return the swept key that is the size, by the columns of conditions.
-
-    Raises
-    ------
-    SpecError
-        If there is none, or another than the one named; one line.
-    """
-    keys = list(dict.fromkeys(key for own in columns.values() for key in own))
-    numbers = [
-        key
-        for key in keys
-        if all(_is_number(own.get(key)) for own in columns.values())
-        and len({own.get(key) for own in columns.values()}) > 1
-    ]
-    if size is not None:
-        key = next((k for k in numbers if size in (k, k.rpartition(".")[2])), None)
-        if key is None:
-            raise SpecError(f"size = {size!r}: {closest(size, numbers)}; a swept key of numbers")
-        return key
-    if len(numbers) != 1:
-        names = ", ".join(numbers) or "none"
-        raise SpecError(f"size: name the swept key that is the size; those of numbers: {names}")
-    return numbers[0]
-
-
-def _is_number(value: object) -> bool:
-    """Return whether a value is a number, or the text of one as in tables of scores."""
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        return False
-    try:
-        float(value)
-    except ValueError:
-        return False
-    return True
+def _until_criterion(results: Results, measure: str, criterion: float) -> SizedValues:
+    """Return the decisions of seeds until a criterion."""
+    samples = decisions_to_criterion(results, measure, criterion)
+    values, censored = ({c: own[k] for c, own in samples.items()} for k in (0, 1))
+    title = f"decisions to {format_number(criterion)} of {measure}"
+    return SizedValues(title, values, NOT_NEGATIVE, censored=censored)
 
 
 def _episodes(results: Results, phase: str) -> dict[str, float]:
@@ -277,7 +256,7 @@ def decisions_to_criterion(
     if measure not in rates:
         raise SpecError(f"measure = {measure!r}: {closest(measure, rates)}; a rate has a criterion")
     if not 0.0 < criterion <= 1.0:
-        raise SpecError(f"criterion = {criterion!r}: must be above 0 and at most 1")
+        raise SpecError(f"criterion = {show(criterion)}: must be above 0 and at most 1")
     samples = {}
     for condition in results.of_phase("training"):
         if not results.has(condition, "training", measure):
@@ -296,36 +275,32 @@ def decisions_to_criterion(
     return samples
 
 
-def _fit(
-    group: str,
-    sizes: Array,
-    samples: Sequence[tuple[pd.Series, pd.Series | None]],
-    episodes: Array | None,
-    bounds: tuple[float, float],
-) -> Fitted:
-    """Return the law of a group, from the seeds that ran at all sizes."""
-    if any(a == b for a, b in pairwise(sizes)):
+def _fit(group: str, sizes_of: Mapping[str, float], measured: SizedValues) -> Fitted:
+    """Return the law of a group, from the seeds that ran at all sizes, which are in order."""
+    sizes = np.array(list(sizes_of.values()))
+    if not (np.diff(sizes) > 0.0).all():
         return Fitted(group, None, "a size occurs twice; conditions differ in something else")
-    frame = pd.concat([own for own, _ in samples], axis=1).dropna()
+    frame = pd.DataFrame({c: measured.values[c] for c in sizes_of}).dropna()
     values = frame.to_numpy(dtype=float)
     censored = np.zeros(values.shape, dtype=bool)
-    for k, (_, marked) in enumerate(samples):
-        if marked is not None:
-            censored[:, k] = marked.loc[frame.index].to_numpy()
+    if measured.censored:
+        marks = pd.DataFrame({c: measured.censored[c] for c in sizes_of})
+        censored = marks.loc[frame.index].to_numpy(dtype=bool)
     if values.size and not censored.any() and np.ptp(values) == 0.0:
         return Fitted(group, None, f"every run has {format_number(values[0, 0])}")
     try:
-        if episodes is not None:
-            sample = of_rates(sizes, values, episodes)
-        elif any(marked is not None for _, marked in samples):
+        if measured.episodes:
+            counts = np.array([measured.episodes[c] for c in sizes_of])
+            sample = of_rates(sizes, values, counts)
+        elif measured.censored:
             sample = of_times(sizes, values, censored)
         else:
-            sample = of_numbers(sizes, values, bounds)
-        return Fitted(group, laws.choose(sample), censored=int(censored.sum()))
+            sample = of_numbers(sizes, values, measured.bounds)
+        return Fitted(group, fitting.choose(sample), censored=int(censored.sum()))
     except ValueError as error:
         is_pair = values.shape[1] == 2 and len(values) > 1 and not censored.any()
         if not is_pair:
             return Fitted(group, None, str(error))
-        most = np.inf if episodes is None else 1.0
+        most = 1.0 if measured.episodes else np.inf
         less = bootstrap(values[:, 1] - values[:, 0], bounds=(-most, most))
         return Fitted(group, None, f"{error}; the larger less the smaller: {format_estimate(less)}")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.numerics import special
-from .statistics import Array
+from ..results.statistics import Array
 
 
 class Curve(NamedTuple):

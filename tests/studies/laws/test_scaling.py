@@ -12,9 +12,9 @@ import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.laws.scaling import scaling_law
 from nested_agents.studies.presentation.growth import growth_figures
 from nested_agents.studies.results.results import from_arrays
-from nested_agents.studies.results.scaling_law import scaling_law
 from research import RESULTS
 
 SIZES = (2, 4, 8)
@@ -86,6 +86,30 @@ def test_a_predicted_size_out_of_range_is_refused(size) -> None:
         scaling_law(made_up({"chain": 1.0}), "steps", predict=[size])
 
 
+def test_a_truth_value_is_no_size() -> None:
+    with pytest.raises(SpecError, match="predict = True: allowed are sizes from 1"):
+        scaling_law(made_up({"chain": 1.0}), "steps", predict=[True])
+
+
+def test_a_law_beyond_the_range_of_a_measure_is_explained() -> None:
+    law = scaling_law(made_up({"chain": 1.0}), "steps", predict=[4, 10**6])
+    assert float(law.table[0].estimates["at 4 (90%)"].value) == pytest.approx(40.0)
+    assert "outside the range" not in " ".join(law.notes)
+    share = replace(SUCCESS, name="share", is_rate=False, least=0.0, greatest=1.0)
+    results = made_up({"chain": 1.0})
+    lengths = results.episodes["condition"].str.extract(r"robots=(\d)")[0].astype(float)
+    results = replace(
+        results,
+        episodes=results.episodes.assign(share=lengths / 10.0),
+        measures=(*results.measures, share),
+    )
+    law = scaling_law(results, "share", predict=[4, 100])
+    text = " ".join(" ".join(law.notes).split())
+    assert "chain: at 100 the law gives 10, outside the range" in text
+    assert "so that 1 is predicted" in text
+    assert "at 4 the law" not in text
+
+
 @pytest.mark.filterwarnings("error")
 def test_rates_are_those_of_the_table() -> None:
     """Of sizes 2, 4, 8 with one, two and three failures in twelve episodes a run."""
@@ -124,7 +148,7 @@ def test_seeds_that_agree_do_not_make_a_law_certain() -> None:
 
 def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
     results = made_up({"chain": 3.0, "star": 5.0})
-    assert list(growth_figures(results)) == ["growth of success"]
+    assert list(growth_figures(results)) == ["growth-of-success"]
     assert growth_figures(made_up({"chain": 3.0}, sizes=(2, 4))) == {}
 
 

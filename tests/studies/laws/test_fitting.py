@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import special
 
-from nested_agents.studies.results import curves, drift, laws, samples
+from nested_agents.studies.laws import curves, drift, fitting, samples
 
 SIZES = np.array([2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
 LAWS = {
@@ -20,7 +20,7 @@ def drawn(of, sizes=SIZES, seeds=10, noise=0.1, seed=0):
 
 
 def test_a_power_law_without_noise_is_met_exactly() -> None:
-    law = laws.choose(samples.of_numbers(SIZES, np.tile(LAWS["power law"](SIZES), (3, 1))))
+    law = fitting.choose(samples.of_numbers(SIZES, np.tile(LAWS["power law"](SIZES), (3, 1))))
     assert law.curve.name == "power law"
     exponent = law.exponents()["exponent"]
     assert [float(end) for end in exponent] == pytest.approx([0.6] * 3)
@@ -30,7 +30,7 @@ def test_a_power_law_without_noise_is_met_exactly() -> None:
 @pytest.mark.parametrize("name", LAWS)
 def test_the_law_that_holds_is_chosen_and_predicts(name) -> None:
     sample = samples.of_numbers(SIZES, drawn(LAWS[name]))
-    law = laws.choose(sample)
+    law = fitting.choose(sample)
     assert law.curve.name == name
     e = law.predict(128.0)
     assert e.low < LAWS[name](np.array(128.0)) < e.high
@@ -40,7 +40,7 @@ def test_the_law_that_holds_is_chosen_and_predicts(name) -> None:
 def test_pairs_of_agents_are_linear_to_quadratic() -> None:
     """As messages of a chain are, n (n - 1) / 2, which no power law predicts."""
     sample = samples.of_numbers(SIZES, np.tile(SIZES * (SIZES - 1.0) / 2.0, (3, 1)))
-    law = laws.choose(sample)
+    law = fitting.choose(sample)
     assert law.curve.name == "linear to quadratic"
     assert float(law.predict(128.0).value) == pytest.approx(128 * 127 / 2, rel=1e-4)
 
@@ -48,7 +48,7 @@ def test_pairs_of_agents_are_linear_to_quadratic() -> None:
 def test_sizes_that_deviate_from_a_law_widen_what_it_predicts_far_away() -> None:
     deviations = np.exp([0.2, -0.2, -0.2, 0.2, 0.2, -0.2])
     laws_of = [
-        laws.fit(curves.POWER, samples.of_numbers(SIZES, np.tile(SIZES * own, (3, 1))))
+        fitting.fit(curves.POWER, samples.of_numbers(SIZES, np.tile(SIZES * own, (3, 1))))
         for own in (np.ones(6), deviations)
     ]
     widths = [[float(np.ptp(np.log(law.predict(n)))) for n in (128.0, 1024.0)] for law in laws_of]
@@ -72,7 +72,7 @@ def test_intervals_cover_laws_whose_exponent_wanders() -> None:
             y.append(y[-1] + slope * h + sigma * h**1.5 * (a / 2.0 + b / 12.0**0.5))
             slope += sigma * a * h**0.5
         values = np.exp(np.array(y) + rng.normal(0.0, 0.1, size=(6, 8)))
-        law = laws.fit(curves.POWER, samples.of_numbers(sizes[:7], values[:, :7]), 100)
+        law = fitting.fit(curves.POWER, samples.of_numbers(sizes[:7], values[:, :7]), 100)
         p = law.predict(64.0)
         inside += bool(p.low <= np.exp(np.log(values[:, 7]).mean()) <= p.high)
     assert 0.86 <= inside / times <= 0.94, inside / times
@@ -93,7 +93,7 @@ def test_a_break_is_met_by_a_fit() -> None:
         return np.where(n < 8.0, n**0.2, 8.0**0.2 * (n / 8.0) ** 1.5)
 
     values = np.tile(broken(SIZES), (3, 1)) * np.array([[0.9], [1.0], [1.1]])
-    fitted = laws.fit(curves.BREAK, samples.of_numbers(SIZES, values)).exponents()
+    fitted = fitting.fit(curves.BREAK, samples.of_numbers(SIZES, values)).exponents()
     assert float(fitted["exponent below"].value) == pytest.approx(0.2, abs=1e-3)
     assert float(fitted["exponent above"].value) == pytest.approx(1.5, abs=1e-3)
     assert float(fitted["break"].value) == pytest.approx(8.0, rel=1e-2)
@@ -108,7 +108,7 @@ def test_predicted_intervals_of_rates_cover_new_rates_near_one() -> None:
     times = 200
     for _ in range(times):
         rates = rng.binomial(10, chances, size=(12, 5)) / 10
-        law = laws.fit(curves.LOGISTIC, samples.of_rates(sizes[:4], rates[:, :4], 10), 100)
+        law = fitting.fit(curves.LOGISTIC, samples.of_rates(sizes[:4], rates[:, :4], 10), 100)
         e = law.predict(32.0)
         inside += bool(e.low <= rates[:, 4].mean() <= e.high)
     assert inside / times >= 0.85, inside / times
@@ -124,7 +124,7 @@ def test_intervals_of_exponents_and_predictions_cover_what_they_promise() -> Non
         noise = rng.normal(0.0, 0.3, size=(9, 5)) + of_seeds
         sizes = np.array([2.0, 4.0, 8.0, 16.0, 64.0])
         values = 5.0 * sizes**0.4 * np.exp(noise)
-        law = laws.fit(curves.POWER, samples.of_numbers(sizes[:4], values[:, :4]), 100)
+        law = fitting.fit(curves.POWER, samples.of_numbers(sizes[:4], values[:, :4]), 100)
         e = law.exponents()["exponent"]
         p = law.predict(64.0)
         new = 5.0 * 64.0**0.4 * np.exp(rng.normal(0.0, np.hypot(0.15, 0.3), size=9).mean())
@@ -136,7 +136,7 @@ def test_intervals_of_exponents_and_predictions_cover_what_they_promise() -> Non
 def test_rates_follow_a_logistic_curve() -> None:
     rng = np.random.default_rng(0)
     rates = 1.0 / (1.0 + np.exp(-(3.0 - 0.9 * np.log(SIZES))))
-    law = laws.choose(samples.of_rates(SIZES, rng.binomial(50, rates, size=(12, 6)) / 50, 50))
+    law = fitting.choose(samples.of_rates(SIZES, rng.binomial(50, rates, size=(12, 6)) / 50, 50))
     assert law.curve.name == "logistic in log n"
     e = law.exponents()["exponent"]
     assert e.low <= -0.9 <= e.high
@@ -145,7 +145,7 @@ def test_rates_follow_a_logistic_curve() -> None:
 
 
 def test_runs_that_all_ended_alike_still_have_an_interval_of_predictions() -> None:
-    law = laws.choose(samples.of_rates(SIZES, np.full((8, 6), 1.0), 10))
+    law = fitting.choose(samples.of_rates(SIZES, np.full((8, 6), 1.0), 10))
     e = law.predict(128.0)
     assert float(e.low) <= float(e.value) <= float(e.high)
 
@@ -155,20 +155,24 @@ def test_what_was_not_reached_is_known_to_be_larger() -> None:
     values = drawn(lambda n: 50.0 * n**0.5, SIZES[:4], noise=0.4)
     limit = 120.0
     cut = np.minimum(values, limit)
-    censored = laws.choose(samples.of_times(SIZES[:4], cut, values > limit)).exponents()["exponent"]
-    taken = laws.fit(curves.POWER, samples.of_numbers(SIZES[:4], cut)).exponents()["exponent"]
+    censored = fitting.choose(samples.of_times(SIZES[:4], cut, values > limit)).exponents()[
+        "exponent"
+    ]
+    taken = fitting.fit(curves.POWER, samples.of_numbers(SIZES[:4], cut)).exponents()["exponent"]
     assert float(taken.value) < float(censored.value) - 0.1
     assert censored.low <= 0.5 <= censored.high
 
 
 def test_exponents_are_compared_seed_by_seed() -> None:
     common = np.random.default_rng(0).normal(size=(8, 1)) * np.log(SIZES)
-    one = laws.fit(curves.POWER, samples.of_numbers(SIZES, np.exp(common + 0.5 * np.log(SIZES))))
-    other = laws.fit(curves.POWER, samples.of_numbers(SIZES, np.exp(common + 0.2 * np.log(SIZES))))
-    contrast = laws.compare(one, other)
+    one = fitting.fit(curves.POWER, samples.of_numbers(SIZES, np.exp(common + 0.5 * np.log(SIZES))))
+    other = fitting.fit(
+        curves.POWER, samples.of_numbers(SIZES, np.exp(common + 0.2 * np.log(SIZES)))
+    )
+    contrast = fitting.compare(one, other)
     assert float(contrast.difference.value) == pytest.approx(0.3)
     assert contrast.p < 1e-6
-    assert laws.compare(one, one).p == 1.0
+    assert fitting.compare(one, one).p == 1.0
 
 
 @pytest.mark.parametrize(
@@ -177,7 +181,7 @@ def test_exponents_are_compared_seed_by_seed() -> None:
 )
 def test_too_little_is_no_law(sizes, seeds, said) -> None:
     with pytest.raises(ValueError, match=said):
-        laws.choose(samples.of_numbers(SIZES[:sizes], np.ones((seeds, sizes))))
+        fitting.choose(samples.of_numbers(SIZES[:sizes], np.ones((seeds, sizes))))
 
 
 def test_nothing_but_censored_runs_is_no_law() -> None:
@@ -196,7 +200,7 @@ def test_a_size_below_one_is_refused(size: float) -> None:
         samples.of_numbers(sizes, np.ones((3, 3)))
     with pytest.raises(ValueError, match=f"size = {size:g}, allowed"):
         samples.of_rates(sizes, np.ones((3, 3)), 10)
-    law = laws.fit(curves.POWER, samples.of_numbers(SIZES, drawn(LAWS["power law"])))
+    law = fitting.fit(curves.POWER, samples.of_numbers(SIZES, drawn(LAWS["power law"])))
     with pytest.raises(ValueError, match=f"size = {size:g}, allowed"):
         law.predict(size)
 
@@ -207,11 +211,11 @@ def test_every_law_holds_from_one_agent_on(curve) -> None:
     """3 n^1.5 with 10% noise, over one to sixteen agents."""
     sizes = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
     values = drawn(lambda n: 3.0 * n**1.5, sizes, seeds=8)
-    law = laws.fit(curve, samples.of_numbers(sizes, values), 20)
+    law = fitting.fit(curve, samples.of_numbers(sizes, values), 20)
     assert np.isfinite(law.parameters).all()
     assert float(law.predict(1.0).value) == pytest.approx(3.0, rel=0.3)
     assert float(law.predict(32.0).value) == pytest.approx(3.0 * 32**1.5, rel=0.5)
-    assert laws.choose(samples.of_numbers(sizes, values)).curve.name == "power law"
+    assert fitting.choose(samples.of_numbers(sizes, values)).curve.name == "power law"
 
 
 def test_the_mean_of_linearized_values_is_the_mean_of_the_table() -> None:
@@ -231,7 +235,7 @@ def test_a_predicted_rate_lies_within_its_range_and_may_be_one() -> None:
     rng = np.random.default_rng(0)
     chances = 1.0 / (1.0 + np.exp(-(3.0 + 0.5 * np.log(SIZES))))
     rates = rng.binomial(10, chances, size=(12, 6)) / 10
-    law = laws.choose(samples.of_rates(SIZES, rates, 10))
+    law = fitting.choose(samples.of_rates(SIZES, rates, 10))
     for size in (1.0, 64.0, 128.0, 1e6):
         e = law.predict(size)
         assert 0.0 <= e.low <= e.value <= e.high <= 1.0
@@ -242,7 +246,7 @@ def test_a_predicted_rate_lies_within_its_range_and_may_be_one() -> None:
 def test_the_noise_of_rates_is_at_least_binomial() -> None:
     """Of rates of ten episodes the variance is p (1 - p) / 10 at least: 4 / 10 on the scale."""
     rates = np.tile([0.9, 0.8, 0.7, 0.6], (6, 1))
-    law = laws.fit(curves.LOGISTIC, samples.of_rates(SIZES[:4], rates, 10))
+    law = fitting.fit(curves.LOGISTIC, samples.of_rates(SIZES[:4], rates, 10))
     assert law.noise == law.scatter == 0.4
 
 
@@ -273,7 +277,7 @@ def test_a_prediction_is_the_law_itself() -> None:
     deviations = np.exp([0.3, -0.2, -0.3, 0.1, 0.2, 0.4])
     values = drawn(lambda n: 5.0 * n**0.6 * deviations)
     for curve in samples.LOG.curves:
-        law = laws.fit(curve, samples.of_numbers(SIZES, values), 20)
+        law = fitting.fit(curve, samples.of_numbers(SIZES, values), 20)
         e = law.predict(128.0)
         assert e.value == law.curve_at(np.array([128.0]))[0]
         assert e.low < e.value < e.high
@@ -281,4 +285,4 @@ def test_a_prediction_is_the_law_itself() -> None:
 
 def test_predictions_stay_within_the_bounds_of_a_measure() -> None:
     sample = samples.of_numbers(SIZES, drawn(lambda n: 0.3 * n**0.25), (0.0, 1.0))
-    assert [float(end) for end in laws.choose(sample).predict(1e4)][::2] == [1.0, 1.0]
+    assert [float(end) for end in fitting.choose(sample).predict(1e4)][::2] == [1.0, 1.0]

@@ -71,6 +71,11 @@ class UniversalLaw(NamedTuple):
         is_shared = float(self.contention.high) >= 0.0 and float(self.contention.value) <= 1.0
         return is_shared and float(self.coherency.high) >= 0.0
 
+    def best_size_within(self, largest: float) -> Estimate | None:
+        """Return the size of maximum throughput; None unless it is one of those up to `largest`."""
+        is_known = self.is_plausible and np.isfinite(self.best_size.high)
+        return self.best_size if is_known and self.best_size.value <= largest else None
+
     def throughput(self, factors: Array) -> Array:
         """Return the throughput relative to the smallest size at sizes relative to it."""
         contention, coherency = float(self.contention.value), float(self.coherency.value)

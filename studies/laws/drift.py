@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.numerics import optimize, special, stats
-from .statistics import Array
+from ..results.statistics import Array
 
 WANDER = 0.3
 """Scale of the prior of sigma."""

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.scalability.laws import (
+from nested_agents.studies.laws.universal import (
     Times,
     fit_universal_law,
     serial_fraction,
     speedups,
 )
+from nested_agents.studies.results.statistics import Estimate
 
 SIZES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
@@ -71,6 +71,13 @@ def test_constant_times_have_no_best_size_instead_of_one_made_of_rounding():
     law = fit_universal_law(Times(SIZES, np.full((5, 5), 449.9), "weak"))
     assert law.coherency.value == pytest.approx(0.0, abs=1e-9)
     assert law.best_size.value == np.inf
+    assert law.best_size_within(SIZES[-1]) is None
+
+
+def test_a_best_size_counts_only_within_the_sizes_measured():
+    law = fit_universal_law(Times(SIZES, np.array([times_of(0.05, 0.01)] * 3), "strong"))
+    assert law.best_size_within(SIZES[-1]) == (law.best_size if SIZES[-1] >= 9.8 else None)
+    assert law.best_size_within(9.0) is None
 
 
 def test_two_sizes_have_no_law():

@@ -1,0 +1,112 @@
+"""The swept key that is the size of a team, and the size of each condition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.plugins.words import closest
+from ..errors import SpecError
+from ..results.results import Results
+from ..results.score_files import NUMBER
+from ..spec.tables import label_but
+
+MAX_SIZE = 1_000_000_000
+"""Maximum size that is fitted or predicted."""
+Columns = Mapping[str, Mapping[str, object]]
+"""Swept keys by condition."""
+
+
+class SizeAxis(NamedTuple):
+    """The swept key that is the size, with the group and the size of each condition.
+
+    Examples
+    --------
+    >>> axis = SizeAxis.of({"2, chain": {"scenario.robots": 2, "topology": "chain"},
+    ...                     "4, chain": {"scenario.robots": "4", "topology": "chain"}})
+    >>> axis.name, axis.places["4, chain"]
+    ('robots', ('chain', 4.0))
+    """
+
+    key: str
+    places: Mapping[str, tuple[str, float]]
+    """Label of the settings besides the size, empty if there are none, and size by condition."""
+
+    @property
+    def name(self) -> str:
+        """Last part of the key."""
+        return self.key.rpartition(".")[2]
+
+    def groups(self) -> dict[str, dict[str, float]]:
+        """Return the sizes of conditions by group, each group from small to large."""
+        groups: dict[str, dict[str, float]] = {group: {} for group, _ in self.places.values()}
+        for condition, (group, n) in sorted(self.places.items(), key=lambda item: item[1][1]):
+            groups[group][condition] = n
+        return groups
+
+    @classmethod
+    def of(cls, columns: Columns, size: str | None = None) -> SizeAxis:
+        """Return the axis of a swept key, or of its last part; by default of the only number.
+
+        Raises
+        ------
+        SpecError
+            If there is no such key, several keys are numbers, or a size is below 1 or above
+            `MAX_SIZE`; one line.
+        """
+        return cls.by(_size_key(columns, size), columns)
+
+    @classmethod
+    def by(cls, key: str, columns: Columns) -> SizeAxis:
+        """Return the axis of a key that all conditions have."""
+        places = {}
+        for condition, row in columns.items():
+            n = float(str(row[key]))
+            check_size(key.rpartition(".")[2], n, f" (condition {condition!r})")
+            places[condition] = label_but(row, [key]), n
+        return cls(key, places)
+
+
+def columns_of(results: Results) -> Columns:
+    """Return what distinguishes each condition; without columns it is its label."""
+    if any(results.columns.values()):
+        return results.columns
+    return {condition: {"condition": condition} for condition in results.columns}
+
+
+def check_size(name: str, size: float, where: str = "") -> None:
+    """Refuse a size that is no number from 1 to `MAX_SIZE`; truth values are no sizes.
+
+    Raises
+    ------
+    SpecError
+        One line that names the size.
+    """
+    is_truth = isinstance(size, bool | np.bool_)
+    if is_truth or not 1.0 <= size <= MAX_SIZE:
+        shown = size if is_truth else f"{size:g}"
+        raise SpecError(f"{name} = {shown}{where}: allowed are sizes from 1 to {MAX_SIZE:,}")
+
+
+def _size_key(columns: Columns, size: str | None) -> str:
+    keys = dict.fromkeys(key for row in columns.values() for key in row)
+    levels = {key: [row.get(key) for row in columns.values()] for key in keys}
+    numbers = [k for k, own in levels.items() if all(map(_is_number, own)) and len({*own}) > 1]
+    if size is not None:
+        key = next((k for k in numbers if size in (k, k.rpartition(".")[2])), None)
+        if key is None:
+            raise SpecError(f"size = {size!r}: {closest(size, numbers)}; a swept key of numbers")
+        return key
+    if len(numbers) != 1:
+        names = ", ".join(numbers) or "none"
+        raise SpecError(f"size: name the swept key that is the size; those of numbers: {names}")
+    return numbers[0]
+
+
+def _is_number(value: object) -> bool:
+    """Return whether a value is a number, or the text of one as in tables of scores."""
+    if isinstance(value, str):
+        return NUMBER.fullmatch(value.strip()) is not None
+    return isinstance(value, int | float) and not isinstance(value, bool)
