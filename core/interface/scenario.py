@@ -1,7 +1,7 @@
 """Interface of scenarios, environments with a task, and the transitions that they return.
 
-Arrays follow the conventions of `spaces`. Scenarios inherit from `Scenario`. Classes of users that
-have its five required members need not, see `nested_agents.core.interface.plain`.
+Arrays follow the conventions of `spaces`. Scenarios inherit from `Scenario`, which has what every
+scenario needs. Optional abilities are protocols, see `nested_agents.core.interface.abilities`.
 """
 
 from __future__ import annotations
