@@ -16,7 +16,6 @@ from nested_agents import (
     BoxPushing,
     BoxPushingSettings,
     FuzzyAgents,
-    Observation,
     Team,
     policy_seed,
 )
@@ -61,7 +60,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
         states = scenario.reset(world_seed(SEED, episode), episode)
         team.begin_episode()
         for step in range(STEPS):
-            seen = Observation(states, scenario)
+            seen = team.observe(scenario, states)
             prediction = model.predict(seen)
             assert isinstance(prediction, EmbodiedPrediction)
             decision = team.act(seen)

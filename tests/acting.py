@@ -7,7 +7,7 @@ import numpy as np
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.experience import Decision, Experience, Observation
-from nested_agents.core.interface.scenario import Transition, checked_scenario
+from nested_agents.core.interface.scenario import Transition, checked_scenario, prediction_of
 
 
 def fuzzy(team: Team) -> FuzzyAgents:
@@ -20,7 +20,7 @@ def look(world: Any, states: Any = None, **more: Any) -> Observation:
     scenario = checked_scenario(world)
     if states is None:
         states = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
-    return Observation(states, scenario, **more)
+    return Observation(states, prediction_of(scenario), **more)
 
 
 def joint_of(team: Team, world: Any, states: Any = None, *, explore: bool = True, **more: Any):

@@ -176,7 +176,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             return
         prediction = self.model.predict(seen)
         neutral = np.full(len(self.hierarchy), self.action_set.neutral)
-        if prediction is None or prediction.rewards(neutral[None]) is None:
+        if prediction.rewards(neutral[None]) is None:
             raise ValueError(
                 f"learner.decision.rule = {rule!r}: no rewards are predicted, use value"
             )
@@ -193,21 +193,20 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def observe(self, seen: Observation, *, explore: bool) -> FuzzyInputs:
         """Return the inputs of a decision."""
-        left = seen.present
+        left = seen.states
         if self._n_told:  # columns for received actions, which `act` fills in
             missing = np.full((len(left), self._n_told), float(len(self.action_set)))
             left = np.hstack([left, missing])
-        prediction = None if self.settings.values_actions else self.model.predict(seen)
+        prediction = UNPREDICTED if self.settings.values_actions else self.model.predict(seen)
         theta = self.learner.theta
-        shared = UNPREDICTED if prediction is None else prediction
         return FuzzyInputs(
             left=left,
             previous=seen.previous if self.settings.decision.unseen == "last" else None,
-            prediction=shared,
+            prediction=prediction,
             weights=weights_by_agent(self._row_of, theta),
             frequencies=self.seen / self.seen.sum(axis=1, keepdims=True),
             explore=explore,
-            views={} if self.views is None else self.views.by_agent(seen, shared, theta),
+            views={} if self.views is None else self.views.by_agent(seen, prediction, theta),
         )
 
     def _joint_search(self, inputs: FuzzyInputs) -> IntArray | None:

@@ -49,11 +49,7 @@ def join_agents(scenario: object, agents: Granularity) -> Scenario:
         If `joint_blocks` refuses the granularity; one line.
     """
     checked = checked_scenario(scenario)
-    if agents == "actuator":
-        return checked
-    if agents == "body" and isinstance(checked, Embodiment):
-        return JointBodies(checked, agents, checked)
-    return JointAgents(checked, agents)
+    return checked if agents == "actuator" else JointAgents(checked, agents)
 
 
 def joint_blocks(
@@ -124,6 +120,10 @@ class JointAgents(Scenario):
         self.whole = each == "team"
         self.measures = scenario.measures
         self.horizon = horizon_of(scenario)
+        if not self.whole and isinstance(scenario, Embodiment):
+            self.nominal_effects = scenario.nominal_effects
+            self.constants = scenario.constants
+            self.levers = scenario.levers
         self._n_each = space.n_variables if self.whole else space.n_own
         of_block = [scenario.agents[i] for i in self.blocks[0]]
         if self.whole:
@@ -170,7 +170,11 @@ class JointAgents(Scenario):
     def predict(self) -> JointPrediction | None:
         """Return the prediction from the present state, if there is one."""
         prediction = self.scenario.predict()
-        return None if prediction is None else JointPrediction(prediction, self)
+        if prediction is None:
+            return None
+        if not self.whole and isinstance(prediction, EmbodiedPrediction):
+            return JointBodiesPrediction(prediction, self)
+        return JointPrediction(prediction, self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
         """Return the actions ``(..., n)`` of all agents for the actions of joint agents."""
@@ -245,23 +249,6 @@ class JointPrediction(Prediction, Tables):
         return self._tables.reward_table()
 
 
-class JointBodies(JointAgents, Embodiment):
-    """A scenario with one agent per body, whose bodies support self-models and calibration."""
-
-    def __init__(self, scenario: Scenario, each: Granularity, bodies: Embodiment) -> None:
-        super().__init__(scenario, each)
-        self._bodies = bodies
-        self.nominal_effects = bodies.nominal_effects
-        self.constants = bodies.constants
-        self.levers = bodies.levers
-
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> EmbodiedPrediction:
-        """Return the prediction for assumed effects and constants."""
-        return JointBodiesPrediction(self._bodies.predict_with(effects, constants), self)
-
-
 class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
     """Prediction of bodies for self-models and calibration, for joint agents."""
 
@@ -269,6 +256,12 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
         super().__init__(prediction, joint)
         self._bodies = prediction
         self.groups = prediction.groups
+
+    def assuming(
+        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
+    ) -> JointBodiesPrediction:
+        """Return the prediction for other effects and constants."""
+        return JointBodiesPrediction(self._bodies.assuming(effects, constants), self._joint)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds that the actions of bodies command."""

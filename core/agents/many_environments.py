@@ -138,7 +138,7 @@ class ManyEnvironmentsLoop:
 
     def step(self) -> list[Finished]:
         """Take one step in all environments; return the episodes that end, by environment."""
-        decision = self._team.act(Observation(self._states, self._scenario), explore=True)
+        decision = self._team.act(Observation(self._states), explore=True)
         transitions = self._environments.step(decision.joint_action)
         self._joint_actions.append(decision.joint_action)
         self._steps += 1

@@ -17,6 +17,7 @@ from ..hierarchy.stages import Inbox
 from ..interface.agents import AgentContext, Agents, StateDict
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition
+from ..learners import check_prediction
 from ..learners.learner import CORE, TeamSettings
 from ..numerics import AnyArray, FloatArray, IntArray
 from ..search.exploration import warm_start_refusal
@@ -109,6 +110,7 @@ class PeerAgents(Agents[PeerInputs]):
     """
 
     def __init__(self, settings: PeerSettings, context: AgentContext) -> None:
+        check_prediction(settings, context.scenario)
         hierarchies = (context.hierarchy,) if settings.uses_hierarchy else ()
         self.peer: Peer = settings.build(context.scenario, context.seed, *hierarchies)
         self.rng = self.peer.rng

@@ -18,7 +18,8 @@ from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_p
 from ..interface.environments import Transitions
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
-from ..interface.scenario import Scenario, checked_scenario
+from ..interface.prediction import UNPREDICTED
+from ..interface.scenario import Scenario, checked_scenario, prediction_of
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
@@ -53,6 +54,8 @@ class Team:
     ----------
     parts
         The agents, one part for each kind.
+    needs_prediction
+        Whether some agents decide or learn by the scenario's predictions.
     messages
         Delivery of messages.
     costs
@@ -89,6 +92,7 @@ class Team:
             failures = ()
         self.hierarchy = hierarchy
         self.action_set = checked.action_set
+        self.needs_prediction = settings.needs_prediction
         kinds = settings.members(checked, hierarchy)
         seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
         parts: list[Agents[Any]] = []
@@ -185,6 +189,28 @@ class Team:
         for part in self.parts:
             part.check_scenario(scenario)
 
+    def observe(
+        self, scenario: Scenario, states: FloatArray, previous: IntArray | None = None
+    ) -> Observation:
+        """Return the observation of a scenario, with its prediction if the agents need one.
+
+        Parameters
+        ----------
+        scenario
+            The scenario in its present state.
+        states
+            ``(n, d)`` present states of the agents.
+        previous
+            ``(n,)`` previous joint action of the episode, if there is one.
+
+        Raises
+        ------
+        ValueError
+            If the scenario predicts something that is no prediction; one line.
+        """
+        prediction = prediction_of(scenario) if self.needs_prediction else UNPREDICTED
+        return Observation(states, prediction, previous)
+
     def reset(self, seed: int | np.random.SeedSequence, episode: int) -> None:
         """Start an episode; random message failures follow from `seed`."""
         self.messages.reset(seed, episode)
@@ -220,14 +246,14 @@ class Team:
         >>> carts = LineUpSettings(carts=2).build()
         >>> chain = Hierarchy(carts.agents, [carts.agents])
         >>> team = Team(BatchTDSettings(), carts, chain, np.random.SeedSequence(0))
-        >>> observation = Observation(carts.reset(0), carts)
+        >>> observation = team.observe(carts, carts.reset(0))
         >>> decision = team.act(observation, explore=False, inspect=True)
         >>> [list(agent.received) for agent in decision.agents]
         [[], ['cart1']]
         """
         if self._present is not self.messages.hierarchy:
             self._rearrange()
-        if inspect and observation.present.ndim > 2:
+        if inspect and observation.states.ndim > 2:
             raise ValueError("inspect = True: a decision of one environment only")
         inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
         inboxes: list[Inbox] | None = None
@@ -259,7 +285,7 @@ class Team:
         inboxes: list[Inbox] | None = None,
     ) -> IntArray:
         """Return the joint action, decided stage by stage; append the inboxes to a list."""
-        shape = (*observation.present.shape[:-2], len(self.hierarchy))
+        shape = (*observation.states.shape[:-2], len(self.hierarchy))
         joint_action = np.full(shape, self.action_set.neutral)
         by_agent = joint_action.T  # a view with the axis of agents first
         fail = bool(self.messages.failures)

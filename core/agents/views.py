@@ -145,7 +145,7 @@ class Views:
                 own = self._errors.weights(agent, theta)
                 constants = self._errors.constants(agent)
                 if constants is not None:
-                    prediction = self._model.predict(seen, constants) or shared
+                    prediction = self._model.predict(seen, constants)
             views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 

@@ -111,7 +111,7 @@ class FunctionAgents(Agents[FunctionInputs]):
 
     def observe(self, seen: Observation, *, explore: bool) -> FunctionInputs:
         """Return the inputs of a decision."""
-        return FunctionInputs(seen.present)
+        return FunctionInputs(seen.states)
 
     def act(self, inputs: FunctionInputs, inbox: Inbox) -> IntArray:
         """Return the actions ``(k,)`` of the agents of a stage.

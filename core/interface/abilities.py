@@ -11,36 +11,26 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-import numpy as np
-
 from ..numerics import BoolArray, FloatArray, IntArray
 from .environments import Environments
-from .prediction import EmbodiedPrediction, Prediction
+from .prediction import Prediction
 from .scenario import Scenario, unwrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Embodiment(ABC):
-    """Bodies with actuators. A scenario that inherits it supports self-models and calibration."""
+@runtime_checkable
+class Embodiment(Protocol):
+    """Bodies with actuators, for self-models and calibration, see `EmbodiedPrediction`."""
 
     nominal_effects: tuple[FloatArray, ...]
     """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
-    constants: tuple[str, ...] = ()
+    constants: tuple[str, ...]
     """Names of the positive constants of the predictor that can be calibrated."""
-    levers: FloatArray = np.zeros(0)
+    levers: FloatArray
     """``(K + M,)`` speed per turning rate of moved objects and of bodies [m], with constants
     only."""
-
-    @abstractmethod
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> EmbodiedPrediction:
-        """Return the prediction from the present state for assumed effects and constants.
-
-        Constants are logarithms of factors on their nominal values.
-        """
 
 
 @runtime_checkable
@@ -149,7 +139,7 @@ class ShowsPolicy(Protocol):
     def show_policy(
         self,
         choose: Callable[[Prediction], IntArray],
-        predict: Callable[[], Prediction | None],
+        predict: Callable[[], Prediction],
     ) -> PolicyMap:
         """Return the actions of a team in many situations. The scenario starts another episode.
 

@@ -6,6 +6,7 @@ Arrays follow the conventions of `spaces`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -164,10 +165,28 @@ def rewards_of(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
 
 
 class EmbodiedPrediction(Prediction):
-    """A prediction for assumed effects of actuators, and possibly for assumed constants."""
+    """A prediction for assumed effects of actuators, and possibly for assumed constants.
+
+    Scenarios with such predictions describe their bodies, see
+    `nested_agents.core.interface.abilities.Embodiment`.
+    """
 
     groups: tuple[tuple[int, ...], ...]
     """Indices of the agents of every body."""
+
+    @abstractmethod
+    def assuming(
+        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
+    ) -> EmbodiedPrediction:
+        """Return the prediction from the same states for other effects and constants.
+
+        Parameters
+        ----------
+        effects
+            Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body; None: as here.
+        constants
+            ``(c,)`` logarithms of factors on the nominal values of the constants; None: as here.
+        """
 
     @abstractmethod
     def commands(self, joint_action: IntArray) -> FloatArray:

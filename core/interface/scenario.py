@@ -18,7 +18,7 @@ import numpy as np
 
 from ..numerics import FloatArray, IntArray
 from .measures import Measure
-from .prediction import Prediction
+from .prediction import UNPREDICTED, Prediction
 from .spaces import ActionSet, StateSpace
 
 Twists = FloatArray | Callable[[], FloatArray | None] | None
@@ -206,6 +206,25 @@ def unwrapped(scenario: Scenario) -> Scenario:
     while isinstance(scenario, ScenarioWrapper):
         scenario = scenario.scenario
     return scenario
+
+
+def prediction_of(scenario: Scenario) -> Prediction:
+    """Return the prediction from the present state; `UNPREDICTED` without a predictor.
+
+    Raises
+    ------
+    ValueError
+        If the scenario returns something else than a prediction or None; one line.
+    """
+    prediction: object = scenario.predict()
+    if prediction is None:
+        return UNPREDICTED
+    if isinstance(prediction, Prediction):
+        return prediction
+    raise ValueError(
+        f"scenario.predict() returned {type(prediction).__name__}, allowed: None or an instance of "
+        "nested_agents.Prediction"
+    )
 
 
 REQUIRED_WITH = {"recorded": "measure", "animate": "constants_of_episode"}

@@ -240,4 +240,6 @@ class LearnerSettings(TeamSettings):
     def needs_prediction(self) -> bool:
         """Whether it requires a scenario with a predictor; a learned predictor replaces it."""
         is_given = isinstance(self.predictor, GivenPredictor)
-        return is_given and self.decision.rule != "random" and not self.values_actions
+        adapts = self.self_model.enabled or self.calibration.enabled
+        decides = self.decision.rule != "random" and not self.values_actions
+        return is_given and (adapts or decides)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..interface.abilities import Embodiment
 from ..interface.experience import Experience, Observation
-from ..interface.prediction import Prediction
+from ..interface.prediction import EmbodiedPrediction, Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray
 from ..plugins.settings import PartSettings
@@ -71,8 +70,8 @@ class TeamModel:
             name: part for name, part in parts.items() if isinstance(part, Adaptive)
         }
 
-    def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction | None:
-        """Return the prediction from the present states; None if the scenario predicts nothing.
+    def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction:
+        """Return the prediction from the present states.
 
         Parameters
         ----------
@@ -81,24 +80,21 @@ class TeamModel:
         errors
             ``(c,)`` errors of the logarithms of the predictor's constants, or None.
         """
-        if seen.imagined is not None:
-            return seen.imagined
         if self.predictor is not None:
-            return self.predictor.predict(seen.present)
+            return self.predictor.predict(seen.states)
         if self.self_model is None and self.calibration is None and errors is None:
-            return _checked(seen.scenario.predict())
-        bodies = seen.scenario
-        if not isinstance(bodies, Embodiment):
+            return seen.prediction
+        if not isinstance(seen.prediction, EmbodiedPrediction):
             raise ValueError(
                 "learner.self_model, calibration, decision.errors: the scenario has no bodies"
             )
-        effects = bodies.nominal_effects if self.self_model is None else self.self_model.effects
+        effects = None if self.self_model is None else self.self_model.effects
         constants = None if self.calibration is None else self.calibration.constants
         if errors is not None:
             constants = errors if constants is None else constants + errors
-        return bodies.predict_with(effects, constants)
+        return seen.prediction.assuming(effects, constants)
 
-    def learn(self, experience: Experience, prediction: Prediction | None) -> None:
+    def learn(self, experience: Experience, prediction: Prediction) -> None:
         """Adapt the models by the outcome of a decision."""
         joint_action = experience.decision.joint_action
         for part in self.adaptive.values():
@@ -113,13 +109,3 @@ class TeamModel:
         """Start from the models of another team."""
         for name in self.adaptive.keys() & former.adaptive.keys():
             self.adaptive[name].warm_start(former.adaptive[name])
-
-
-def _checked(prediction: object) -> Prediction | None:
-    """Return what a scenario predicts; refuse what is no prediction."""
-    if prediction is None or isinstance(prediction, Prediction):
-        return prediction
-    raise ValueError(
-        f"scenario.predict() returned {type(prediction).__name__}, allowed: None or an instance of "
-        "nested_agents.Prediction"
-    )

@@ -157,7 +157,7 @@ class PPOAgents(Agents[PolicyInputs]):
 
     def observe(self, seen: Observation, *, explore: bool) -> PolicyInputs:
         """Return the inputs of a decision, with noise if the agents explore."""
-        states = seen.present
+        states = seen.states
         own, joint = self._encode(states.reshape(-1, *states.shape[-2:]))
         n_told = len(self.told_names)
         actor = np.zeros((*own.shape[:2], n_told + own.shape[2]), np.float32)

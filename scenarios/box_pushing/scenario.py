@@ -6,14 +6,13 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.interface.abilities import Embodiment
 from ...core.interface.environments import Transitions
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, Transition
@@ -23,7 +22,7 @@ from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, w
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
-from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap, model_of
+from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
@@ -45,7 +44,7 @@ SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
 
 
-class BoxPushing(Scenario, Embodiment):
+class BoxPushing(Scenario):
     """Box pushing: the agents are the wheels of robots, which push a box to a goal.
 
     It can be drawn, calibrated and predicted exactly.
@@ -212,26 +211,19 @@ class BoxPushing(Scenario, Embodiment):
 
     def predict(self) -> BoxPrediction:
         """Predict from the current state; all robots are assumed to be nominal."""
-        return self.predict_with(self.nominal_effects)
-
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> BoxPrediction:
-        """Predict with the given effects of the wheels and constants of the push."""
         situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
             self._goal,
             self._speeds,
-            tuple(effects),
+            self.nominal_effects,
         )
-        model = self._model if constants is None else model_of(self._belief, constants)
         if self._playground is None or self._saved is None:
-            return BoxPrediction(situation, model, self._prediction)
+            return BoxPrediction(situation, self._model, self._prediction)
         future = Future(
             self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
         )
-        return ExactPrediction(situation, model, self._prediction, future)
+        return ExactPrediction(situation, self._model, self._prediction, future)
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""
@@ -261,7 +253,7 @@ class BoxPushing(Scenario, Embodiment):
     def show_policy(
         self,
         choose: Callable[[Prediction], IntArray],
-        predict: Callable[[], Prediction | None],
+        predict: Callable[[], Prediction],
     ) -> BoxPolicyMap:
         """Return the policy map of a team; the scenario is reset.
 

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.interface.abilities import Embodiment
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import EmbodiedPrediction, first_alike
@@ -41,7 +40,7 @@ MAX_BEND = 2.5
 """Maximum start angle of a joint other than the base [rad]."""
 
 
-class KinematicChain(Scenario, Embodiment):
+class KinematicChain(Scenario):
     """A planar arm with exact predictions and support for self-models.
 
     Parameters
@@ -79,6 +78,8 @@ class KinematicChain(Scenario, Embodiment):
         self.state_space = self._states.space
         self.nominal_effects = (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * n
         """Effect of a joint's speed on its twist ``(3, 2)``: it only turns."""
+        self.constants: tuple[str, ...] = ()
+        self.levers: FloatArray = np.zeros(0)
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # Failures of the coming step, for informed predictions; the others are of the last step.
         self._known = Failures(settings.failures, self.agents, self._limits)
@@ -140,12 +141,7 @@ class KinematicChain(Scenario, Embodiment):
     def predict(self) -> ChainPrediction:
         """Predict from the present state, with failures if the settings say `informed`."""
         nominal = self.settings.predictor == "nominal"
-        return self.predict_with(self.nominal_effects if nominal else self._actual_effects())
-
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> ChainPrediction:
-        """Predict from the present state, given the effects ``(3, 2)`` of the joints."""
+        effects = self.nominal_effects if nominal else self._actual_effects()
         return ChainPrediction(self, effects, self._angles, self._speeds, self._distance())
 
     def _actual_effects(self) -> tuple[FloatArray, ...]:
@@ -317,6 +313,13 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         self.speeds = np.ascontiguousarray(commanded.T)
         self.turns = np.ascontiguousarray((after - angles).T)
         self._fractions = self.speeds / arm.settings.top_speed
+        self._present = angles, speeds, before
+
+    def assuming(
+        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
+    ) -> ChainPrediction:
+        """Return the prediction for other effects of the joints; there are no constants."""
+        return self if effects is None else ChainPrediction(self.arm, effects, *self._present)
 
     def view_after(self, joint_actions: IntArray) -> ChainView:
         """Return the arm after joint actions ``(m, n)``."""

@@ -159,11 +159,10 @@ def _policy(session: Session) -> PolicyMap | str:
     nowhere: FloatArray = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
 
     def choose(prediction: Prediction) -> IntArray:
-        seen = Observation(nowhere, scenario, imagined=prediction)
-        return session.team.act(seen, explore=False).joint_action
+        return session.team.act(Observation(nowhere, prediction), explore=False).joint_action
 
-    def predict() -> Prediction | None:
-        return agents.model.predict(Observation(nowhere, scenario))
+    def predict() -> Prediction:
+        return agents.model.predict(session.team.observe(scenario, nowhere))
 
     if not isinstance(scenario, ShowsPolicy):
         return "the scenario has no method show_policy for agents such as these"
@@ -211,7 +210,7 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         states = scenario.reset(world, episode)
         team.reset(world, episode)
         for _ in range(DECISIONS):
-            joint = team.act(Observation(states, scenario), explore=False).joint_action
+            joint = team.act(team.observe(scenario, states), explore=False).joint_action
             guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}
             given = scenario.predict() if horizon_of(scenario) == horizon else None
             if given is not None:

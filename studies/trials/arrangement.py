@@ -14,7 +14,6 @@ import numpy as np
 
 from ...core.agents.loop import policy_seed
 from ...core.agents.team import Team
-from ...core.interface.experience import Observation
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import Scenario, checked_scenario
 from ...core.plugins.sources import format_error, place
@@ -187,5 +186,5 @@ def _arrangements(condition: Condition) -> Iterator[Arrangement]:
     evaluations = transfer(own, settings, condition.evaluations, 0)
     for there in (own, *(a for _, a in stages), *(a for _, a in evaluations)):
         if settings.learner.needs_rewards:
-            there.team.check(Observation(there.scenario.reset(0), there.scenario))
+            there.team.check(there.team.observe(there.scenario, there.scenario.reset(0)))
         yield there

@@ -14,10 +14,10 @@ from typing import Any
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.many_environments import ManyEnvironmentsLoop
 from ...core.agents.team import Team
-from ...core.interface.abilities import Batched, Recorded
+from ...core.interface.abilities import Recorded
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import checked_scenario
-from ...core.interface.stacked import LoopedEnvironments
+from ...core.interface.stacked import make_environments
 from ...core.numerics import working_seconds
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
@@ -226,11 +226,7 @@ class Session:
     def _parallel_loop(self) -> ManyEnvironmentsLoop:
         settings = self.trial.settings
         count = settings.learner.n_environments
-        first = arrange(settings, self.trial.seed).scenario
-        environments = first.environments(count) if isinstance(first, Batched) else None
-        if environments is None:
-            others = (arrange(settings, 0).scenario for _ in range(count - 1))
-            environments = LoopedEnvironments([first, *others])
+        environments = make_environments(lambda: arrange(settings, 0).scenario, count)
         return ManyEnvironmentsLoop(
             environments, self.scenario, self.team, self.trial.steps, self.trial.seed
         )

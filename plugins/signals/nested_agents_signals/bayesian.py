@@ -87,7 +87,7 @@ class BayesianAgents(na.Agents[Beliefs]):
 
     def observe(self, seen: na.Observation, *, explore: bool) -> Beliefs:
         """Return the signals; no message has been received yet."""
-        signals = seen.present[..., 0] > 0.5
+        signals = seen.states[..., 0] > 0.5
         return Beliefs(signals, np.zeros((*signals.shape, 2)))
 
     def act(self, inputs: Beliefs, inbox: na.Inbox) -> IntArray:

@@ -7,6 +7,7 @@ state spaces with the wheel speed as the only own variable that is exact.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import ClassVar
@@ -23,7 +24,7 @@ from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.reward import Task, reward
 from ..world.settings import InfraredSettings
-from .calibration import PushBelief, mean_twists, outcomes
+from .calibration import PushBelief, mean_twists, model_of, outcomes
 from .push import PushModel, push
 from .responses import Outlook, respond
 from .wheel_commands import WheelCommands, robot_actions, speeds_of, twist_table, wheel_commands_of
@@ -98,6 +99,16 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         self.settings = settings
         self.groups = settings.groups
         self._last: tuple[bytes, SituationBatch] | None = None  # the last request
+
+    def assuming(
+        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
+    ) -> BoxPrediction:
+        """Return the prediction for other effects of the wheels and constants of the push."""
+        situation = self.situation
+        if effects is not None:
+            situation = replace(situation, effects=tuple(effects))
+        model = self.model if constants is None else model_of(self.settings.belief, constants)
+        return BoxPrediction(situation, model, self.settings)
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:

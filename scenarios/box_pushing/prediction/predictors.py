@@ -13,6 +13,7 @@ exact
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -111,6 +112,13 @@ class ExactPrediction(BoxPrediction):
     ) -> None:
         super().__init__(situation, model, settings)
         self.future = future
+
+    def assuming(
+        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
+    ) -> ExactPrediction:
+        """Return the prediction for other effects of the wheels; the simulation remains."""
+        other = super().assuming(effects, constants)
+        return ExactPrediction(other.situation, other.model, self.settings, self.future)
 
     def best_responses(self, rules: RuleBase) -> None:
         """Return None, because every joint action must be simulated."""

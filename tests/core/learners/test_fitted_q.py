@@ -126,7 +126,7 @@ def told_in(team: Team, decisions: int = 20) -> tuple[np.ndarray, np.ndarray]:
     team.begin_episode()
     previous = None
     for _ in range(decisions):
-        seen = Observation(np.zeros((3, 1)), fuzzy(team).scenario, previous)
+        seen = Observation(np.zeros((3, 1)), previous=previous)
         decision = team.act(seen)
         previous = decision.joint_action
         did.append(previous)
@@ -173,7 +173,7 @@ def test_who_is_told_learns_a_best_reply_and_who_is_not_does_not() -> None:
         for episode in range(10):
             states = game.reset(episode)
             both.begin_episode()
-            seen = Observation(states, game)
+            seen = Observation(states)
             for play in range(20):
                 decision = both.act(seen)
                 transition = game.step(decision.joint_action)

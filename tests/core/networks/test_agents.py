@@ -355,7 +355,7 @@ class Mine(na.Peer):
         self.hierarchy = hierarchy
 
     def act(self, seen, *, explore=True):
-        return [0] * len(seen.present)
+        return [0] * len(seen.states)
 """
 SPEC = """
 scenario.kind = "line-up"

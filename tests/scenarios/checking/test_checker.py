@@ -788,7 +788,9 @@ BLIND: dict[str, Callable[[], Scenario]] = {
     "after": predicting(after=lambda self, joint_action: self),
     "partners": line(partners=lambda self: (0, 0)),
     "run_episode": line(run_episode=lambda self, *args, **kwargs: None),
-    "animate": line(animate=lambda self, recording, path: None),
+    "animate": line(
+        animate=lambda self, recording, path: None, constants_of_episode=lambda self: {}
+    ),
 }
 """What is wrong and not noticed."""
 

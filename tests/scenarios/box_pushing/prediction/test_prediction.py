@@ -122,7 +122,7 @@ def test_contact_takes_nothing_from_robots_in_the_open_however_fast_they_are_bel
     )
     believed = [effect.copy() for effect in scenario.nominal_effects]
     believed[0][2, -1] = rate  # turns by itself [rad/s]
-    slips = scenario.predict_with(believed).slips(np.full(4, 2))
+    slips = scenario.predict().assuming(believed).slips(np.full(4, 2))
     np.testing.assert_allclose(slips[:, 2], 0.0, atol=1e-9)
 
 
