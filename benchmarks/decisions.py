@@ -81,9 +81,7 @@ def _episode(
     seed = world_seed(0, episode)
     states = scenario.reset(seed, episode)
     previous = None
-    team.reset(seed, episode)
-    if learn:
-        team.begin_episode()
+    team.reset(seed, episode, learn=learn)
     taken = []
     for step in range(steps):
         begun = thread_time()

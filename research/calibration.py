@@ -58,7 +58,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
     beliefs, errors = [], []
     for episode in range(episodes):
         states = scenario.reset(world_seed(SEED, episode), episode)
-        team.begin_episode()
+        team.reset(0, 0, learn=True)
         for step in range(STEPS):
             seen = team.observe(scenario, states)
             prediction = model.predict(seen)

@@ -15,6 +15,7 @@ from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox, is_fully_communicating
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.experience import Experience, Observation
+from ..interface.measures import Measure
 from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
@@ -105,6 +106,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self._actions_of_left = NOBODY
         self.is_private = is_private(settings, scenario)
         self.views: Views | None = None
+        self.costs: tuple[Measure, ...] = ()
         self.evaluator = self._evaluator()
         self._searches_jointly = self._can_search_jointly(context)
         self._neutral = np.full(n, self.action_set.neutral)
@@ -186,10 +188,11 @@ class FuzzyAgents(Agents[FuzzyInputs]):
                 "predicts from predicted states"
             )
 
-    def begin_episode(self) -> None:
-        """Start an episode of training."""
-        self.explorer.begin_episode()
-        self.learner.begin_episode()
+    def reset(self, episode: int, *, learn: bool) -> None:
+        """Start an episode."""
+        if learn:
+            self.explorer.begin_episode()
+            self.learner.begin_episode()
 
     def observe(self, seen: Observation, *, explore: bool) -> FuzzyInputs:
         """Return the inputs of a decision."""
@@ -289,7 +292,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def conclude(self, inputs: FuzzyInputs, joint_action: IntArray) -> None:
         """Advance exploration and count the actions of all agents, if the agents explore."""
-        inputs.agreement = agreement(inputs.expected, joint_action)
         if not inputs.explore or self.evaluator is None:
             return
         self.explorer.advance()
@@ -298,9 +300,11 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.given.size:
             self.given[every[:, None], joint_action[:, None], every, joint_action] += 1.0
 
-    def decision_costs(self, inputs: FuzzyInputs) -> Mapping[str, float]:
+    def decision_costs(self, inputs: FuzzyInputs, joint_action: IntArray) -> Mapping[str, float]:
         """Return agreement and communication, for agents with views of their own."""
-        return {} if self.views is None else self.views.decision_costs(inputs, self.hierarchy)
+        if self.views is None:
+            return {}
+        return self.views.decision_costs(agreement(inputs.expected, joint_action), self.hierarchy)
 
     def record_values(self, inputs: FuzzyInputs) -> None:
         """Keep the values of actions in this decision; each agent then searches on its own."""

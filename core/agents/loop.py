@@ -106,9 +106,7 @@ def control_loop(
         seed_of_world = world_seed(seed, first_world + k)
         states = space.checked(world.reset(seed_of_world, episode), world.agents)
         previous = None
-        team.reset(seed_of_world, episode)
-        if learn:
-            team.begin_episode()
+        team.reset(seed_of_world, episode, learn=learn)
         team.check(team.observe(world, states))
         for step in range(steps):
             begin = working_seconds()

@@ -116,9 +116,10 @@ class PeerAgents(Agents[PeerInputs]):
         self.rng = self.peer.rng
         self.is_stochastic = self.peer.is_stochastic
 
-    def begin_episode(self) -> None:
-        """Start an episode of learning."""
-        self.peer.begin_episode()
+    def reset(self, episode: int, *, learn: bool) -> None:
+        """Start an episode."""
+        if learn:
+            self.peer.begin_episode()
 
     def observe(self, seen: Observation, *, explore: bool) -> PeerInputs:
         """Return the inputs of a decision."""

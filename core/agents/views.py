@@ -71,8 +71,6 @@ class FuzzyInputs:
     """Own views by agent; empty if all agents share prediction and weights."""
     expected: dict[int, IntArray] = field(default_factory=dict)
     """Joint action that an agent expected when it decided, for agents with own views and plans."""
-    agreement: float = 1.0
-    """Share of expected actions that came true, see `agreement`."""
 
 
 class Views:
@@ -149,11 +147,11 @@ class Views:
             views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 
-    def decision_costs(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
+    def decision_costs(self, agreement: float, hierarchy: Hierarchy) -> Mapping[str, float]:
         """Return agreement and communication of a decision by the names of `costs`."""
         share = len(self._members) / len(hierarchy)  # the other parts add their shares
         spent = {
-            "agreement": inputs.agreement * share,
+            "agreement": agreement * share,
             "received": float(sum(len(hierarchy.senders(i)) for i in self._members)),
             "broadcast": self._broadcast,
         }

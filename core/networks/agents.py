@@ -66,7 +66,6 @@ class PPOAgents(Agents[PolicyInputs]):
     """
 
     is_stochastic = True
-    is_vectorized = True
 
     def __init__(
         self, settings: MultiAgentPPOSettings | PPOSettings, context: AgentContext
@@ -192,6 +191,9 @@ class PPOAgents(Agents[PolicyInputs]):
         chosen: IntArray = (logits + inputs.noise[:, inbox.agents]).argmax(axis=2)
         return chosen.reshape(*inputs.batch_shape, -1)
 
+    def record_values(self, inputs: PolicyInputs) -> None:
+        """Do nothing, because inputs always contain the logits."""
+
     def action_values(self, inputs: PolicyInputs) -> Mapping[int, FloatArray]:
         """Return the log probabilities ``(A,)`` of the actions of each member."""
         log_probs = inputs.logits[0] - log_sum_exp(inputs.logits[0])[:, None]
@@ -211,7 +213,7 @@ class PPOAgents(Agents[PolicyInputs]):
         self.learn_batch(joint_actions, inputs, transitions, np.array([experience.last]))
 
     def learn_batch(
-        self, joint: IntArray, inputs: PolicyInputs, steps: Transitions, last: BoolArray
+        self, joint_actions: IntArray, inputs: PolicyInputs, steps: Transitions, last: BoolArray
     ) -> None:
         """Append a step of all environments, and update the policies when rollouts are full."""
         rewards = steps.rewards
@@ -219,7 +221,7 @@ class PPOAgents(Agents[PolicyInputs]):
             rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
         for name, policy in self.policies.items():
             rows = self._rows[name]
-            logits, actions = self._by_head(inputs.logits, joint, rows)
+            logits, actions = self._by_head(inputs.logits, joint_actions, rows)
             own = inputs.actor[:, rows]
             policy.append((own, inputs.joint), logits, actions, rewards[:, rows], last)
         truncated = last & ~steps.terminated

@@ -40,8 +40,7 @@ def team_of(table: dict[str, Any], scenario: Any, *failures: LostMessages) -> Te
 def train(scenario: Any, team: Team, *, inspect: bool) -> list[list[int]]:
     """Return the joint actions of an episode of training."""
     seen = team.observe(scenario, scenario.reset(3))
-    team.reset(3, 0)
-    team.begin_episode()
+    team.reset(3, 0, learn=True)
     joint_actions = []
     for step in range(12):
         decision = team.act(seen, inspect=inspect)

@@ -182,7 +182,7 @@ def test_a_reward_of_a_terminal_state_that_does_not_absorb_is_received_once(worl
     for absorbing, value in ((False, 2.0), (True, 2.0 / (1.0 - gamma))):
         team = Team(settings, world, chain_of(world.agents), policy_seed(0))
         states = world.reset(0)
-        team.begin_episode()
+        team.reset(0, 0, learn=True)
         seen = look(world, states)
         ended = Transition(states, 2.0, True, False, {}, absorbing=absorbing)
         team.learn(Experience(seen, team.act(seen), ended, last=True))
