@@ -205,9 +205,7 @@ class FunctionAgents(Agents[FunctionInputs]):
         replies = inputs.replies.items()
         return {agent: reply.message for agent, reply in replies if reply.message is not None}
 
-    def decision_costs(
-        self, inputs: FunctionInputs, joint_action: IntArray
-    ) -> Mapping[str, float]:
+    def decision_costs(self, inputs: FunctionInputs, joint_action: IntArray) -> Mapping[str, float]:
         """Return the costs of all answers of a decision."""
         total = {measure.name: 0.0 for measure in self.costs}
         counts = (len(inputs.replies), inputs.message_bytes)
