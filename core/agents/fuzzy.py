@@ -16,7 +16,7 @@ from ..hierarchy.stages import Inbox, is_fully_communicating
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.experience import Experience, Observation
 from ..interface.measures import Measure
-from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
+from ..interface.prediction import NOT_EXPLORING, UNPREDICTED, Prediction
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
@@ -101,6 +101,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.learner: Learner = settings.build(self.rules, rows)
         must_inherit("learner.kind", self.learner, Learner)
         self._placement = context
+        self._is_checked = False
         self._evaluators: dict[Hierarchy, Evaluator | None] = {}
         self._left = NOBODY
         self._actions_of_left = NOBODY
@@ -165,8 +166,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Memory of the consequent weights [bytes]."""
         return self.learner.theta.nbytes
 
-    def check(self, seen: Observation) -> None:
-        """Refuse a scenario without the predictions that the search requires.
+    def _check(self, prediction: Prediction) -> None:
+        """Refuse a prediction without what the search requires.
 
         Raises
         ------
@@ -176,13 +177,11 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         rule = self.settings.decision.rule
         if self.evaluator is None or rule == "value":
             return
-        prediction = self.model.predict(seen)
-        neutral = np.full(len(self.hierarchy), self.action_set.neutral)
-        if prediction.rewards(neutral[None]) is None:
+        if prediction.rewards(self._neutral[None]) is None:
             raise ValueError(
                 f"learner.decision.rule = {rule!r}: no rewards are predicted, use value"
             )
-        if self.evaluator.continues and prediction.after(neutral) is None:
+        if self.evaluator.continues and prediction.after(self._neutral) is None:
             raise ValueError(
                 "learner.decision.evaluator: plans of several decisions need a scenario that "
                 "predicts from predicted states"
@@ -201,6 +200,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             missing = np.full((len(left), self._n_told), float(len(self.action_set)))
             left = np.hstack([left, missing])
         prediction = UNPREDICTED if self.settings.values_actions else self.model.predict(seen)
+        if not self._is_checked:
+            self._check(prediction)
+            self._is_checked = True
         theta = self.learner.theta
         return FuzzyInputs(
             left=left,
@@ -368,10 +370,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
     def count(self, updates: int) -> None:
         """Count changed weights."""
         self.counts.weight_updates += updates
-
-    def check_scenario(self, scenario: Scenario) -> None:
-        """Refuse a scenario with other state variables, actions or owners of weights."""
-        self._carried_rows(scenario, self.members)
 
     def _carried_rows(self, other: Scenario, members: IntArray) -> IntArray:
         """Return the row of these weights from which every row in another scenario starts."""

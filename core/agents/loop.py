@@ -107,7 +107,6 @@ def control_loop(
         states = space.checked(world.reset(seed_of_world, episode), world.agents)
         previous = None
         team.reset(seed_of_world, episode, learn=learn)
-        team.check(team.observe(world, states))
         for step in range(steps):
             begin = working_seconds()
             seen = team.observe(world, states, previous)

@@ -17,11 +17,9 @@ from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
 from ..interface.agents import (
     AgentContext,
     Agents,
-    ChecksPredictions,
     Counts,
     Inspectable,
     ObservesJointActions,
-    Particular,
     Rearrangeable,
     ReportsCosts,
     ReportsResources,
@@ -194,7 +192,7 @@ class Team:
             generator.state = state
 
     def check(self, observation: Observation) -> None:
-        """Refuse a prediction that lacks what the agents decide by.
+        """Refuse an observation without what the agents decide by.
 
         Raises
         ------
@@ -202,20 +200,7 @@ class Team:
             One line.
         """
         for part in self.parts:
-            if isinstance(part, ChecksPredictions):
-                part.check(observation)
-
-    def check_scenario(self, scenario: Scenario) -> None:
-        """Refuse another scenario in which the trained team cannot act.
-
-        Raises
-        ------
-        ValueError
-            One line.
-        """
-        for part in self.parts:
-            if isinstance(part, Particular):
-                part.check_scenario(scenario)
+            part.observe(observation, explore=False)
 
     def observe(
         self, scenario: Scenario, states: FloatArray, previous: IntArray | None = None

@@ -186,34 +186,6 @@ class Rearrangeable(Protocol):
 
 
 @runtime_checkable
-class Particular(Protocol):
-    """Trained agents cannot act in every scenario."""
-
-    def check_scenario(self, scenario: Scenario) -> None:
-        """Refuse another scenario in which the trained agents cannot act.
-
-        Raises
-        ------
-        ValueError
-            One line.
-        """
-
-
-@runtime_checkable
-class ChecksPredictions(Protocol):
-    """Agents need predictions that not every predictor makes."""
-
-    def check(self, observation: Observation) -> None:
-        """Refuse a prediction that lacks what the agents decide by.
-
-        Raises
-        ------
-        ValueError
-            One line.
-        """
-
-
-@runtime_checkable
 class ReportsCosts(Protocol):
     """Decisions of the agents have costs, which become columns of results."""
 

@@ -255,6 +255,16 @@ def checked_scenario(thing: object) -> Scenario:
     return thing
 
 
+def has_same_agents(scenario: Scenario, other: Scenario) -> bool:
+    """Return whether agents of one scenario can act in another one as they are."""
+    return (
+        tuple(scenario.agents) == tuple(other.agents)
+        and scenario.roles == other.roles
+        and scenario.state_space == other.state_space
+        and scenario.action_set == other.action_set
+    )
+
+
 class Members(NamedTuple):
     """Some agents of a scenario."""
 

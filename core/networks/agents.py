@@ -240,7 +240,7 @@ class PPOAgents(Agents[PolicyInputs]):
         """Return logits ``(E, k, h, A)`` and actions ``(E, k, h)`` of the rows of a policy."""
         return logits[:, rows, None], joint[:, rows, None]
 
-    def check_scenario(self, scenario: Scenario) -> None:
+    def _check(self, scenario: Scenario) -> None:
         """Refuse a scenario with other states or actions."""
         if scenario.state_space != self.scenario.state_space:
             raise ValueError(f"{self._trained(scenario)}: the state spaces differ")
@@ -261,7 +261,7 @@ class PPOAgents(Agents[PolicyInputs]):
         ValueError
             If states, actions, or the owners of weights differ; one line.
         """
-        former.check_scenario(self.scenario)
+        former._check(self.scenario)
         if self.policies.keys() != former.policies.keys():
             raise ValueError(
                 f"{former._trained(self.scenario)}: learner.weights = {self.settings.weights!r}; "
@@ -335,9 +335,9 @@ class CentralPPOAgents(PPOAgents):
         """Return logits ``(E, 1, h, A)`` and actions ``(E, 1, h)``."""
         return logits[:, None, self.members], joint[:, None, self.members]
 
-    def check_scenario(self, scenario: Scenario) -> None:
+    def _check(self, scenario: Scenario) -> None:
         """Refuse a scenario with other states, actions or agents."""
-        super().check_scenario(scenario)
+        super()._check(scenario)
         if tuple(scenario.agents) != tuple(self.scenario.agents):
             raise ValueError(f"{self._trained(scenario)}: one policy acts for all of them")
 

@@ -15,7 +15,7 @@ import numpy as np
 from ...core.agents.loop import policy_seed
 from ...core.agents.team import Team
 from ...core.interface.measures import Measure, measures_of
-from ...core.interface.scenario import Scenario, checked_scenario
+from ...core.interface.scenario import Scenario, checked_scenario, has_same_agents
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage
@@ -99,8 +99,7 @@ def transfer(
     for name, other in evaluations:
         with _naming(f"evaluations.{name}"):
             there = arrange(other, seed)
-            if other.acts_as(settings) and there.scenario.agents == own.scenario.agents:
-                own.team.check_scenario(there.scenario)
+            if other.acts_as(settings) and has_same_agents(there.scenario, own.scenario):
                 there = there._replace(team=own.team)
             else:
                 there.team.warm_start(own.team)
