@@ -136,6 +136,7 @@ AXES: dict[str, dict[str, SpecTable]] = {
         "given": {},
         "static": _predicted("static"),
         "learned": _predicted("learned"),
+        "poses": {"scenario": BOX, **_predicted("poses")},
         "none": {"scenario": WALKER},
         "none but learned": {"scenario": WALKER, **_predicted("learned")},
     },

@@ -39,6 +39,8 @@ class HierarchyView:
     """Number of actions of an agent."""
     failures: tuple[MessageFailure, ...] = ()
     """Failures of messages."""
+    others: tuple[str, ...] = ()
+    """Further topologies that give the same hierarchy."""
 
     @property
     def tries(self) -> tuple[int, ...]:
@@ -53,13 +55,15 @@ class HierarchyView:
 
     @property
     def remarks(self) -> list[str]:
-        """One line on communication and lookahead unless they are the defaults; one per failure."""
+        """Lines on equal topologies, failures, and relations other than the defaults."""
         both = self.hierarchy.communication, self.hierarchy.lookahead
         communication, lookahead = (r if isinstance(r, str) else " and ".join(r) for r in both)
         messages = f"{self.hierarchy.n_messages:,} messages a step"
         relations = f"communication: {communication}; lookahead: {lookahead}; {messages}"
         is_changed = both != ("ancestors", "descendants")
-        return [relations] * is_changed + [f"fails: {failure.text}" for failure in self.failures]
+        lines = [f"the same hierarchy: {', '.join(self.others)}"] * bool(self.others)
+        lines += [relations] * is_changed
+        return lines + [f"fails: {failure.text}" for failure in self.failures]
 
     @property
     def title(self) -> str:

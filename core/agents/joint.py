@@ -15,7 +15,7 @@ remain the same.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Literal
@@ -124,6 +124,7 @@ class JointAgents(Scenario):
             self.nominal_effects = scenario.nominal_effects
             self.constants = scenario.constants
             self.levers = scenario.levers
+            self.regression_shapes = scenario.regression_shapes
         self._n_each = space.n_variables if self.whole else space.n_own
         of_block = [scenario.agents[i] for i in self.blocks[0]]
         if self.whole:
@@ -263,6 +264,13 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
         """Return the prediction for other effects and constants."""
         return JointBodiesPrediction(self._bodies.assuming(effects, constants), self._joint)
 
+    def with_poses(
+        self, effects: Sequence[FloatArray] | None, weights: Sequence[FloatArray], decisions: int
+    ) -> JointBodiesPrediction:
+        """Return the prediction by learned weights."""
+        prediction = self._bodies.with_poses(effects, weights, decisions)
+        return JointBodiesPrediction(prediction, self._joint)
+
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds that the actions of bodies command."""
         return self._bodies.commands(self._joint.actions(joint_action))
@@ -274,3 +282,9 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return predicted twists for choices of constants."""
         return self._bodies.outcomes(self._joint.actions(joint_action), constants)
+
+    def pose_samples(
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features and targets of all regressions of poses."""
+        return self._bodies.pose_samples(self._joint.actions(joint_action), info)

@@ -124,7 +124,8 @@ class Views:
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
             n_constants = 0
-            if settings.decision.errors.constants and isinstance(scenario, Embodiment):
+            needs_constants = settings.decision.errors.constants and model.predictor is None
+            if needs_constants and isinstance(scenario, Embodiment):
                 n_constants = len(scenario.constants)
             valued = concerned(hierarchy, settings.decision.value_of)
             self._errors = Errors(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @runtime_checkable
 class Embodiment(Protocol):
-    """Bodies with actuators, for self-models and calibration, see `EmbodiedPrediction`."""
+    """Bodies with actuators, for models that adapt an `EmbodiedPrediction`."""
 
     nominal_effects: tuple[FloatArray, ...]
     """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
@@ -31,6 +31,9 @@ class Embodiment(Protocol):
     levers: FloatArray
     """``(K + M,)`` speed per turning rate of moved objects and of bodies [m], with constants
     only."""
+    regression_shapes: tuple[tuple[int, int], ...]
+    """Numbers of features and targets of the regressions that predict poses; empty if poses cannot
+    be learned."""
 
 
 @runtime_checkable

@@ -6,7 +6,7 @@ Arrays follow the conventions of `spaces`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -188,6 +188,15 @@ class EmbodiedPrediction(Prediction):
             ``(c,)`` logarithms of factors on the nominal values of the constants; None: as here.
         """
 
+    def with_poses(
+        self, effects: Sequence[FloatArray] | None, weights: Sequence[FloatArray], decisions: int
+    ) -> EmbodiedPrediction:
+        """Return the prediction for assumed effects and the weights ``(f, t)`` of all regressions.
+
+        The wheel speeds after the first joint action are held for a number of decisions.
+        """
+        raise TypeError(f"{type(self).__name__} has no poses to learn")
+
     @abstractmethod
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` commands."""
@@ -202,6 +211,16 @@ class EmbodiedPrediction(Prediction):
         Twists of moved objects come before those of bodies, see `Transition.twists`.
         """
         raise TypeError(f"{type(self).__name__} has no constants")
+
+    def pose_samples(
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features ``(m, f)`` and targets ``(m, t)`` of all regressions of poses.
+
+        See `Embodiment.regression_shapes`; `info` holds measurements after the joint action
+        ``(n,)``, see `Transition`.
+        """
+        raise TypeError(f"{type(self).__name__} has no poses to learn")
 
 
 def first_alike(keys: IntArray | FloatArray) -> IntArray:

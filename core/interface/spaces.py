@@ -115,6 +115,10 @@ class StateSpace:
     >>> space = StateSpace("demo", (Variable("speed", "m/s", -1, 1), Variable("gap", "m", 0, 2)), 1)
     >>> space.n_variables, [v.name for v in space.shared]
     (2, ['gap'])
+    >>> print(space)
+    demo: own variables, then shared ones
+      own     speed [m/s]  -1 to 1
+      shared  gap [m]  0 to 2
     """
 
     name: str
@@ -146,6 +150,13 @@ class StateSpace:
         for name in self.actions:
             if name not in names:
                 raise ValueError(f"state space {self.name!r}: action {name!r} is no variable")
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: own variables, then shared ones"]
+        for k, v in enumerate(self.variables):
+            kind = "own" if k < self.n_own else "shared"
+            lines.append(f"  {kind:<6}  {v.name} [{v.unit}]  {v.low:.3g} to {v.high:.3g}")
+        return "\n".join(lines)
 
     def checked(self, states: FloatArray, agents: Sequence[str]) -> FloatArray:
         """Return a checked copy of the states of agents.

@@ -68,8 +68,24 @@ class LearnedPredictorSettings(PartSettings):
     declares a mirror symmetry."""
 
 
+class PosePredictorSettings(PartSettings):
+    """A model of poses learned online, which knows outlines and kinematics of bodies.
+
+    It does not know masses, frictions and stiffness. A self-model may learn the effects of the
+    wheels, too.
+    """
+
+    kind: Literal["poses"] = "poses"
+    factory: ClassVar[str] = f"{__package__}.pose_model:PoseModel"
+    horizon: Annotated[int, Field(ge=1, le=50)] = 4
+    """Number of decisions to predict; the first joint action is held."""
+    ridge: Positive = 0.001
+    """Penalty on squared weights, relative to squared errors [m2/s2]."""
+
+
 Predictor = Annotated[
-    GivenPredictor | StaticPredictor | LearnedPredictorSettings, Field(discriminator="kind")
+    GivenPredictor | StaticPredictor | LearnedPredictorSettings | PosePredictorSettings,
+    Field(discriminator="kind"),
 ]
 """The settings of any predictor, distinguished by ``kind``."""
 

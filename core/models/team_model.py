@@ -11,7 +11,8 @@ from ..numerics import FloatArray
 from ..plugins.settings import PartSettings
 from .adaptive import Adaptive, DynamicsModel
 from .calibration import Calibration, CalibrationSettings
-from .predictors import GivenPredictor
+from .pose_model import PoseModel
+from .predictors import GivenPredictor, PosePredictorSettings
 from .self_model import SelfModel, SelfModelSettings
 
 
@@ -28,7 +29,7 @@ class TeamModel:
     Attributes
     ----------
     predictor
-        Dynamics model used instead of the scenario's predictor, or None.
+        Model used instead of the scenario's predictor, or None.
     self_model
         Learned effects of the wheels; None: nominal effects.
     calibration
@@ -51,10 +52,14 @@ class TeamModel:
     ) -> None:
         self.self_model = SelfModel.of(self_model, scenario)
         self.calibration = Calibration.of(calibration, scenario)
-        self.predictor: DynamicsModel | None = None
+        self.predictor: DynamicsModel | PoseModel | None = None
         if not isinstance(predictor, GivenPredictor):
             named = f"learner.predictor.kind = {predictor.kind!r}"
-            revised = {"self_model": self_model.enabled, "calibration": calibration.enabled}
+            needs_given = not isinstance(predictor, PosePredictorSettings)
+            revised = {
+                "self_model": self_model.enabled and needs_given,
+                "calibration": calibration.enabled,
+            }
             for name in (name for name, enabled in revised.items() if enabled):
                 raise ValueError(
                     f"learner.{name}.enabled: adapts the predictor of the scenario, but {named} "
@@ -80,15 +85,19 @@ class TeamModel:
         errors
             ``(c,)`` errors of the logarithms of the predictor's constants, or None.
         """
-        if self.predictor is not None:
+        if isinstance(self.predictor, DynamicsModel):
             return self.predictor.predict(seen.states)
-        if self.self_model is None and self.calibration is None and errors is None:
+        parts = (self.predictor, self.self_model, self.calibration, errors)
+        if all(part is None for part in parts):
             return seen.prediction
         if not isinstance(seen.prediction, EmbodiedPrediction):
             raise ValueError(
                 "learner.self_model, calibration, decision.errors: the scenario has no bodies"
             )
         effects = None if self.self_model is None else self.self_model.effects
+        if self.predictor is not None:
+            weights, horizon = self.predictor.weights, self.predictor.horizon
+            return seen.prediction.with_poses(effects, weights, horizon)
         constants = None if self.calibration is None else self.calibration.constants
         if errors is not None:
             constants = errors if constants is None else constants + errors

@@ -22,10 +22,12 @@ from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, w
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
-from .prediction.calibration import APART, CONSTANTS, PushBelief, mean_twists, min_gap
+from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap
+from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
+from .prediction.twists import mean_twists
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
 from .states.variables import progress_of
@@ -69,6 +71,7 @@ class BoxPushing(Scenario):
     """
 
     measures = MEASURES
+    regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
     recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:

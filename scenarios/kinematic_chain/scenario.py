@@ -80,6 +80,7 @@ class KinematicChain(Scenario):
         """Effect of a joint's speed on its twist ``(3, 2)``: it only turns."""
         self.constants: tuple[str, ...] = ()
         self.levers: FloatArray = np.zeros(0)
+        self.regression_shapes: tuple[tuple[int, int], ...] = ()
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # Failures of the coming step, for informed predictions; the others are of the last step.
         self._known = Failures(settings.failures, self.agents, self._limits)

@@ -107,7 +107,9 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
     yield f"failed   {now.failed}"
     yield f"left     {now.left}"
     if now.seconds:
-        yield f"time     about {duration(now.seconds)} with {count(now.processes, 'process', 'es')}"
+        using = "with" if now.running else "if continued with"
+        processes = count(now.processes, "process", "es")
+        yield f"time     about {duration(now.seconds)} {using} {processes}"
     if not store.is_older and (remark := other_spec(store)) is not None:
         yield f"spec     {remark}"
     if now.refusal:

@@ -61,6 +61,7 @@ def draw_by_size(cases: Sequence[SizedCase], titles: Sequence[str]) -> "Figure":
     groups = distinct(case.group for case in cases)
     count = len(titles) * len(groups)
     columns = len(groups) if len(groups) > 1 else min(count, 3)
+    all_sizes = sorted({case.robots for case in cases})
     figure, panels = figures.grid(count, columns, (2.8, 2.3), (0.3, 0.8), least=5.6)
     for k, axes in enumerate(panels.flat[:count]):
         title = titles[k // len(groups)]
@@ -76,8 +77,11 @@ def draw_by_size(cases: Sequence[SizedCase], titles: Sequence[str]) -> "Figure":
                 robots = [case.robots for case in own]
                 figures.draw_line(axes, robots, estimates, index, len(names))
         axes.set_title(f"{title}, {group}" if group else title, loc="left")
-        figures.scale_axis(axes, sorted({case.robots for case in cases}))
+        figures.scale_axis(axes, all_sizes)
         axes.set_xlabel(cases[0].sizes.word)
+        if len(all_sizes) == 1:
+            axes.set_xticks([])
+            axes.set_xlabel(cases[0].sizes.shown(all_sizes[0]))
         if title == EVALUATED:
             figures.as_rates(axes)
         elif title == "messages":

@@ -7,7 +7,7 @@ in them are escaped, see `printable`.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain
 from shutil import get_terminal_size
 from textwrap import fill
@@ -15,9 +15,12 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from ...core.plugins.printing import printable
 from ...core.shell import command_line
+from ..errors import refused
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from matplotlib.figure import Figure
 
     from ..api.study import StudyResults
     from ..presentation.tables import SummaryTable
@@ -80,6 +83,16 @@ def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
     print_lines(study.notes)
     if not any(note.startswith("Power:") for note in study.notes):  # one number of power a study
         print_lines(study.power)
+
+
+def save_plot(draw: Callable[[], Figure], path: Path) -> None:
+    """Draw and write a figure, and say where it is."""
+    from ..presentation.figures import write  # Matplotlib is slow to import
+    from ..presentation.progress import say
+
+    with refused():
+        write(draw(), path)
+    say(f"figure  {path}")
 
 
 def show_results(

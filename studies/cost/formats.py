@@ -42,7 +42,7 @@ FORMULAS = Section(
         "nested_exact": "Eq. 18",
         "nested_closed_form": "Eq. 19",
         "nested_asymptotic": "Eq. 21",
-        "single_agent": "single agent",
+        "single_agent": "Eq. 23",
         "ratio": "ratio",
     },
 )
@@ -148,6 +148,7 @@ def _varied(frame: pd.DataFrame) -> list[str]:
 def _cells(section: Section, frame: pd.DataFrame) -> list[list[str]]:
     """Return the cells of a section, headings first; equal rows stand once."""
     varied = _varied(frame) if {"nested_exact", "budget"} & {*section.headings} else []
+    varied = [name for name in varied if name != "memberships"]  # the rules say the same
     columns = [*varied, "agents", "topology", *section.headings]
     names = [*varied, "n", "topology", *section.headings.values()]
     part = frame.reindex(columns=columns).drop_duplicates()
@@ -201,9 +202,11 @@ def _constants(rows: Sequence[CostRow], frame: pd.DataFrame) -> str:
 
 def _legend(rows: Sequence[CostRow], frame: pd.DataFrame) -> Iterator[str]:
     yield "Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23."
-    power = f"; rules = memberships^{VARIABLES}" if "memberships" in _varied(frame) else ""
     constants = _constants(rows, frame)
-    yield f"{constants[0].upper()}{constants[1:]}{power}."
+    yield f"{constants[0].upper()}{constants[1:]}."
+    if "memberships" in _varied(frame):
+        numbers = " or ".join(dict.fromkeys(str(row.memberships) for row in rows))
+        yield f"Rules |S| = memberships^{VARIABLES}, with {numbers} memberships."
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         yield (
             "The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4: it cuts "

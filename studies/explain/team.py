@@ -23,6 +23,7 @@ from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
 from ...core.models.learned_predictor import LearnedPredictor
+from ...core.models.pose_model import PoseModel
 from ...core.numerics import FloatArray, IntArray
 from ...core.values.rule_base import RuleBase
 from ...scenarios.checking.predictions import state_differences
@@ -200,18 +201,20 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         Of the trial.
     """
     agents = team.parts[0]
-    predictor = agents.model.predictor if isinstance(agents, FuzzyAgents) else None
-    if not isinstance(predictor, LearnedPredictor):
+    model = agents.model if isinstance(agents, FuzzyAgents) else None
+    if model is None or not isinstance(model.predictor, LearnedPredictor | PoseModel):
         return None
-    horizon = predictor.horizon
+    horizon = model.predictor.horizon
     errors: defaultdict[str, list[FloatArray]] = defaultdict(list)
     for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
         world = world_seed(seed, episode)
         states = scenario.reset(world, episode)
         team.reset(world, episode)
         for _ in range(DECISIONS):
-            joint = team.act(team.observe(scenario, states), explore=False).joint_action
-            guesses = {"learned": _states(predictor.predict(states), joint), "persistence": states}
+            seen = team.observe(scenario, states)
+            joint = team.act(seen, explore=False).joint_action
+            learned = _states(model.predict(seen), joint)
+            guesses = {"learned": learned, "persistence": states}
             given = scenario.predict() if horizon_of(scenario) == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)

@@ -203,8 +203,15 @@ class SummaryTable:
         """Lines that explain the cells."""
         if not self.rows:
             return ["no trial has finished"]
+        if self.seeds == 1:
+            return ["Values of 1 seed, without intervals."]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
-        return [f"Means over {over} with 95% intervals.", self.remark]
+        lines = [f"Means over {over} with 95% intervals.", self.remark]
+        columns = zip(*(cells for *_, cells in self.rows), strict=True)
+        known = ({not cell.interval for cell in column if cell is not None} for column in columns)
+        if any(len(kinds) > 1 for kinds in known):
+            lines.append("Without an interval: one seed has the value, or all seeds have the same.")
+        return lines
 
     @property
     def meanings(self) -> dict[str, str]:

@@ -103,7 +103,7 @@ def _fixed(value: float, decimals: int, rounding: str = ROUND_HALF_UP, *, signed
     return f"{mantissa}e{int(power)}"
 
 
-WHOLE = re.compile(r"[-+]?\d\S* \[[^]]*\]|\w+ [=<] \S+|\d+ seeds?|last \d+")
+WHOLE = re.compile(r"[-+]?\d\S* \[[^]]*\]|\(\S+ unadjusted\)|\w+ [=<] \S+|\d+ seeds?|last \d+")
 """Text that is not broken: an estimate with its interval, ``p = 0.03``, a count of seeds."""
 
 

@@ -76,7 +76,8 @@ def bootstrap(
 
     Whole runs are resampled. The percentiles lie further out than `level`, by as much as Student's
     t distribution does and variances of few runs fall short (Hesterberg 2015, Section 5.2). With
-    fewer than `FEW` runs the interval is Student's, which is exact for normal values.
+    fewer than `FEW` runs the interval is Student's, which is exact for normal values; equal ones
+    have none.
 
     Parameters
     ----------
@@ -116,6 +117,8 @@ def bootstrap(
     t = float(special.stdtrit(n_runs - 1, 0.5 + level / 2.0))
     if n_runs < FEW:
         half = t * np.sqrt(array.var(axis=0, ddof=1) / n_runs)
+        equal = (array == array[0]).all(axis=0)
+        half = np.where(equal & (value > bounds[0]) & (value < bounds[1]), np.nan, half)
         low, high = value - half, value + half
     else:
         tail = special.ndtr(-t * math.sqrt(n_runs / (n_runs - 1)))

@@ -1,6 +1,7 @@
 """Distinct hierarchies of a study's conditions and evaluations."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from ...topologies.view import HierarchyView
 from ..errors import refused
@@ -8,29 +9,33 @@ from ..spec.conditions import ConditionSettings
 from ..spec.spec import Spec
 
 
-def hierarchies_of(spec: Spec) -> Iterator[HierarchyView]:
-    """Yield the distinct hierarchies of a spec, each labeled by its first condition.
+def hierarchies_of(spec: Spec) -> list[HierarchyView]:
+    """Return the distinct hierarchies of a spec, each labeled by its first condition.
 
     Raises
     ------
     SpecError
         If a hierarchy cannot be built, in one line.
     """
-    seen = set[object]()
+    worlds = set[object]()
+    views: dict[object, HierarchyView] = {}
     for label, settings in _labeled(spec):
         world = settings.scenario.model_dump_json(), settings.agents, settings.topology
-        if world in seen:
+        if world in worlds:
             continue
-        seen.add(world)
+        worlds.add(world)
         with refused(after=f" (condition {label!r})"):
             scenario, hierarchy = settings.arrange(settings.scenario.build())
         n_actions = len(scenario.action_set)
         failures = settings.topology.failures
         relations = hierarchy.communication, hierarchy.lookahead
         content = hierarchy.agents, hierarchy.edges, relations, failures, n_actions
-        if content not in seen:
-            seen.add(content)
-            yield HierarchyView(label, hierarchy, scenario.groups, n_actions, failures)
+        if content in views:
+            same = views[content]
+            views[content] = replace(same, others=(*same.others, label))
+        else:
+            views[content] = HierarchyView(label, hierarchy, scenario.groups, n_actions, failures)
+    return list(views.values())
 
 
 def _labeled(spec: Spec) -> Iterator[tuple[str, ConditionSettings]]:

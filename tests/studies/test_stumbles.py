@@ -162,7 +162,7 @@ def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
         ),
         (
             'learner.predictor.kind = "push"',
-            "learner.predictor.kind = 'push': known: given, learned, static; did you mean "
+            "learner.predictor.kind = 'push': known: given, learned, poses, static; did you mean "
             "scenario.predictor = 'push'?",
         ),
         (
@@ -170,7 +170,10 @@ def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
             "learner.predictor = 'copy': must be a table; did you mean scenario.predictor = "
             "'copy'?",
         ),
-        ('learner.predictor.kind = "copy"', "kind = 'copy': known: given, learned, static\n"),
+        (
+            'learner.predictor.kind = "copy"',
+            "kind = 'copy': known: given, learned, poses, static\n",
+        ),
     ],
 )
 def test_a_predictor_of_the_wrong_table_is_pointed_to_the_right_one(

@@ -56,8 +56,10 @@ class BoxScene(Scene):
                 np.maximum(centers.max(axis=0) + reach, robots.max(axis=0) + radius),
             ]
         )
-        self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), axisbelow=True)
-        self.axes.set_aspect("equal", adjustable="datalim")
+        panel = np.multiply(SIDES, AXES[2:])
+        middle, half = (low + high) / 2.0, panel * ((high - low) / panel).max() / 2.0
+        x, y = zip(middle - half, middle + half, strict=True)
+        self.axes.set(xlim=x, ylim=y, axisbelow=True)
         self.axes.grid(color="#eeeeee")
         self._add_box(goal, fill=False, ls="--", lw=1.5, ec=GOAL_COLOR, zorder=3)
         self._moving = []  # the goal stays
@@ -90,6 +92,7 @@ class BoxScene(Scene):
         line = style | {"ls": "-", "fill": False}
         self._patch(PathPatch(curve(self.box), **style), pose)
         self._patch(Polygon(arrow, closed=False, **line), pose)
+        self._patch(Circle((0, 0), 0.12 * length, fc=line["ec"], ec="none", zorder=3), pose)
 
     def _add_robot(self, r: int, step: int, *, is_silent: bool) -> None:
         poses = self.recording["robot_poses"][:, r]

@@ -1,4 +1,4 @@
-"""Constants of the push predictor that a team can calibrate, and measured twists.
+"""Constants of the push predictor that a team can calibrate.
 
 With all forces multiplied by one factor, so that servos, grip and ground friction are equally
 stronger, every body moves as before. Therefore motions determine only two ratios of the three
@@ -9,16 +9,16 @@ nominal values.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
 from ....core.numerics import FloatArray, njit
-from ...angles import rotate
 from ..world.robots import resistance
 from ..world.settings import RobotSettings
-from .push import PushModel, push
+from .models import PushModel
+from .push import push
+from .twists import twist_between
 
 CONSTANTS = ("load per stiffness", "load per grip", "contact friction")
 """The ground friction of the box over the stiffness of the wheels' servos, and over that of their
@@ -60,7 +60,9 @@ def model_of(belief: PushBelief, constants: FloatArray) -> PushModel:
             for j in range(3):
                 compliance[r, i, j] = inverse[i, j]
     friction = model.contact_friction * factors[2]
-    return PushModel(model.shape, model.radii, compliance, model.friction_force, friction)
+    return PushModel(
+        model.shape, model.radii, compliance, model.friction_force, friction, model.learned
+    )
 
 
 @njit(cache=True)
@@ -98,36 +100,10 @@ def outcomes(
     for p in range(len(constants)):
         model = model_of(belief, constants[p])
         after, boxes, _ = push(robots, box, commanded, choices, seconds, model)
-        _twist(box, boxes[:, 0], seconds, moved[p, 0])
+        twist_between(box, boxes[:, 0], seconds, moved[p, 0])
         for r in range(n):
-            _twist(robots[r], after[r, :, 0], seconds, moved[p, r + 1])
+            twist_between(robots[r], after[r, :, 0], seconds, moved[p, r + 1])
     return moved
-
-
-@njit(cache=True)
-def _twist(before: FloatArray, after: FloatArray, seconds: float, out: FloatArray) -> None:
-    """Write the constant twist ``(3,)`` in its own frame that leads from one pose to another."""
-    half = 0.5 * (after[2] - before[2])
-    # The chord of an arc is shorter than the arc by the sinc of half its angle.
-    clipped = min(max(half, -0.5 * pi), 0.5 * pi)
-    longer = clipped / np.sin(clipped) if abs(clipped) > 1e-9 else 1.0
-    cos, sin = np.cos(before[2] + half), np.sin(before[2] + half)
-    x, y = after[0] - before[0], after[1] - before[1]
-    along, across = rotate(cos, -sin, x * longer, y * longer)
-    out[0], out[1], out[2] = along / seconds, across / seconds, 2.0 * half / seconds
-
-
-@njit(cache=True)
-def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:
-    """Return the constant twists ``(M, 3)``, own frame, between poses ``(M, 3)``.
-
-    Headings count whole turns. For arcs beyond half a turn the speed is too low, because their
-    chord no longer determines their length.
-    """
-    twists = np.empty(before.shape)
-    for r in range(len(before)):
-        _twist(before[r], after[r], seconds, twists[r])
-    return twists
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ state spaces with the wheel speed as the only own variable that is exact.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import ClassVar
@@ -24,9 +24,12 @@ from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.reward import Task, reward
 from ..world.settings import InfraredSettings
-from .calibration import PushBelief, mean_twists, model_of, outcomes
-from .push import PushModel, push
+from .calibration import PushBelief, model_of, outcomes
+from .models import LearnedPush, PushModel
+from .poses import samples_of
+from .push import push
 from .responses import Outlook, respond
+from .twists import mean_twists
 from .wheel_commands import WheelCommands, robot_actions, speeds_of, twist_table, wheel_commands_of
 
 CONTACT_GAP_M = 0.002
@@ -109,6 +112,15 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
             situation = replace(situation, effects=tuple(effects))
         model = self.model if constants is None else model_of(self.settings.belief, constants)
         return BoxPrediction(situation, model, self.settings)
+
+    def with_poses(
+        self, effects: Sequence[FloatArray] | None, weights: Sequence[FloatArray], decisions: int
+    ) -> BoxPrediction:
+        """Return the prediction by learned pushing, see `poses`."""
+        period = self.settings.period
+        model = self.model._replace(learned=LearnedPush(period, *weights))
+        settings = replace(self.settings, horizon=decisions * period)
+        return BoxPrediction(self.assuming(effects).situation, model, settings)
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:
@@ -301,6 +313,15 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         twists = self._twists(joint_action)
         constants = np.ascontiguousarray(constants)
         return outcomes(now.robots, now.box, twists, period, self.settings.belief, constants)
+
+    def pose_samples(
+        self, joint_action: IntArray, info: Mapping[str, FloatArray]
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return features and targets of the box's twist and of the robots' deflections."""
+        before = np.vstack([self.situation.box, self.situation.robots])
+        after = np.vstack([info["box_pose"], info["robot_poses"]])
+        commands = self._twists(joint_action)
+        return samples_of(before, after, commands, self.settings.period, self.model)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""

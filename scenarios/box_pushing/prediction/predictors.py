@@ -27,8 +27,8 @@ from ..world.boxes import BoxSpec
 from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
+from .models import PushModel
 from .prediction import BoxPrediction, PredictionSettings, PresentState
-from .push import PushModel
 from .settings import BeliefSettings
 from .wheel_commands import speeds_of
 

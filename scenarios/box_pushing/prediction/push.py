@@ -17,13 +17,13 @@ instructions of the processor. The reference in plain Python is in the tests, `p
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ....core.numerics import BoolArray, FloatArray, IntArray, njit
 from ...angles import cos_sin, rotate
-from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, BoxShape, block_of, nearest_points
+from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, block_of, nearest_points
+from .models import PushModel
+from .poses import push_by_weights
 
 SUBSTEPS = 4
 SWEEPS = 4
@@ -63,22 +63,6 @@ _EXACT = {"contract", "nsz"}
 """Floating-point liberties: fused multiply-add, and zeros without sign."""
 
 
-class PushModel(NamedTuple):
-    """Model of ``M`` robots and a box."""
-
-    shape: BoxShape
-    """Outline of the box, and its friction radius rho."""
-    radii: FloatArray
-    """``(M,)`` robot radii [m]."""
-    compliance: FloatArray
-    """``(M, 3, 3)`` symmetric; twist per wrench in the robot frame [m/s, rad/s per N, Nm]; zero:
-    rigid."""
-    friction_force: float
-    """Maximum ground friction of the box, F [N]."""
-    contact_friction: float
-    """Coefficient of friction between robot and box."""
-
-
 @njit(cache=True)
 def push(
     robots: FloatArray,
@@ -110,6 +94,8 @@ def push(
     robots, box, gaps : FloatArray
         Robot poses ``(M, 3, m)``, box poses ``(3, m)`` and gaps ``(M, m)`` [m].
     """
+    if model.learned.period > 0.0:
+        return push_by_weights(robots, box, twists, choices, seconds, model)
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     bodies, boxes, blocks = np.zeros(n, ROBOT), np.zeros(1, BOX), np.zeros(1, NEAREST)

@@ -18,7 +18,8 @@ from ....core.search.drawing import draw, explored
 from ....core.values.triangular import summed_values
 from ..states.situations import SituationBatch
 from ..states.variables import evaluate
-from .push import PushModel, push
+from .models import PushModel
+from .push import push
 from .wheel_commands import WheelCommands, robot_actions, speeds_of
 
 MAX_BODIES_AHEAD = 4

@@ -202,6 +202,7 @@ def cost(
             from ...cost.figure import draw
 
             draw(rows, plot)
+            say(f"figure  {plot}")
     print_data(f"{format_rows(rows, form)}\n")
     return 0
 
@@ -352,6 +353,7 @@ def show(
 
 def _draw(hierarchy: view.HierarchyView, path: Path) -> None:
     from ....topologies.drawing import draw  # matplotlib takes its time
+    from ...presentation.progress import say
 
     draw(
         hierarchy.hierarchy,
@@ -360,6 +362,7 @@ def _draw(hierarchy: view.HierarchyView, path: Path) -> None:
         title=hierarchy.title,
         failing=hierarchy.failing,
     )
+    say(f"figure  {path}")
 
 
 def _of_spec(path: str) -> list[view.HierarchyView] | None:
@@ -386,7 +389,7 @@ def _of_spec(path: str) -> list[view.HierarchyView] | None:
 
     spec = Spec.load(Path(path))
     with spec.sources.active():
-        return list(hierarchies_of(spec))
+        return hierarchies_of(spec)
 
 
 def _over(topology: str, scenario: str) -> list[view.HierarchyView]:

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import click
 
-from ...errors import refused
 from .. import options
-from ..display import Form, in_form, print_data, print_table, print_text
+from ..display import Form, in_form, print_data, print_table, print_text, save_plot
 from ..loading import read_results, say_remarks
 
 
@@ -67,10 +66,7 @@ def fit(
         loaded, measure, phase=phase, size=size, criterion=criterion, predict=predict
     )
     if plot is not None:
-        from ...presentation.figures import write
-
-        with refused():
-            write(growth.figure(), plot)
+        save_plot(growth.figure, plot)
     if form != "table":
         print_data(in_form(growth.table, form))
         return 0

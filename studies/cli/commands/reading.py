@@ -9,7 +9,7 @@ import click
 
 from ....core.shell import command_line
 from ...api.status import describe, failures, progress
-from ...errors import SpecError, refused
+from ...errors import SpecError
 from ...presentation.progress import say
 from ...spec.outline import StudyOutline, sources_of
 from ...store import durable
@@ -23,6 +23,7 @@ from ..display import (
     print_study,
     print_table,
     print_text,
+    save_plot,
 )
 from ..loading import (
     load_results,
@@ -144,10 +145,7 @@ def compare(
     loaded = read_results(sources, where=where, trust=trust, columns=columns, better=better)
     comparison = loaded.compare(**compared)
     if plot is not None:
-        from ...presentation.figures import write
-
-        with refused():
-            write(comparison.figure(), plot)
+        save_plot(comparison.figure, plot)
     if out is not None:
         comparison.report(out, ", ".join(map(str, sources)))
     if form != "table":

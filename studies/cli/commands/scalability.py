@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ...errors import refused
 from .. import options
-from ..display import Form, in_form, print_data, print_lines, print_table, print_text
+from ..display import Form, in_form, print_data, print_lines, print_table, print_text, save_plot
 from ..loading import read_results, say_remarks
 
 if TYPE_CHECKING:
@@ -94,10 +93,7 @@ def scalability(
         return 0
     report = loaded.scalability(measure, **choices)  # type: ignore[arg-type]
     if plot is not None:
-        from ...presentation.figures import write
-
-        with refused():
-            write(report.figure(), plot)
+        save_plot(report.figure, plot)
     if form == "json":
         print_data(report.json)
     elif form != "table":

@@ -17,7 +17,7 @@ from nested_agents.core.models.self_model import SelfModelSettings
 from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.calibration import mean_twists
+from nested_agents.scenarios.box_pushing.prediction.twists import mean_twists
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build, parse
 

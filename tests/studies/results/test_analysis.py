@@ -29,9 +29,11 @@ from nested_agents.studies.results.statistics import NOT_NEGATIVE, Estimate, boo
 
 
 def within(estimate: Estimate, bounds: tuple[float, float]) -> bool:
-    """Return whether an interval lies within bounds and contains its value."""
+    """Return whether an interval, if there is one, lies within bounds and contains its value."""
     least, greatest = bounds
     value, low, high = map(float, estimate)
+    if np.isnan([low, high]).all():
+        return least <= value <= greatest
     return least <= low <= value + 1e-9 and value - 1e-9 <= high <= greatest
 
 
@@ -78,7 +80,7 @@ def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
         float(compare_conditions(results, "steps").table[0].estimates["evaluation steps"].high)
         == 150.0
     )
-    equal = estimate_of(lengths([[25], [25]], StepLimits(25, 25)), "a", "evaluation", STEPS)
+    equal = estimate_of(lengths([[25]] * 8, StepLimits(25, 25)), "a", "evaluation", STEPS)
     assert tuple(map(float, equal)) == (25.0, 25.0, 25.0)
 
 

@@ -90,7 +90,7 @@ def the_key(name: str) -> Key:
         ("learner.rule_base.memberships", "whole number", "none", ">= 2, <= 15", ""),
         ("topology.members", "nested lists of text", "none", "", ""),
         ("overrides.name", "text", "required", "", ""),
-        ("learner.predictor.kind", "text", '"given"', "given, static, learned", ""),
+        ("learner.predictor.kind", "text", '"given"', "given, static, learned, poses", ""),
     ],
 )
 def test_a_key(name: str, kind: str, default: str, allowed: str, unit: str) -> None:

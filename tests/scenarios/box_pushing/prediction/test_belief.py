@@ -17,12 +17,12 @@ from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.calibration import (
     CONSTANTS,
-    mean_twists,
     min_gap,
     model_of,
     outcomes,
     push,
 )
+from nested_agents.scenarios.box_pushing.prediction.twists import mean_twists
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build
 from research.scripted.controller import ScriptedController

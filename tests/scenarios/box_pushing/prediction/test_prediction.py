@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.prediction.calibration import mean_twists
+from nested_agents.scenarios.box_pushing.prediction.twists import mean_twists
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 
 

@@ -9,7 +9,7 @@ from push_oracle import push_one
 from nested_agents.core.numerics import FloatArray, IntArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction import push as kernels
-from nested_agents.scenarios.box_pushing.prediction.push import PushModel
+from nested_agents.scenarios.box_pushing.prediction.models import PushModel
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance
