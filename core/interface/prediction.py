@@ -143,7 +143,10 @@ class Unpredicted(Prediction):
         ValueError
             Always.
         """
-        raise ValueError("nothing is predicted here: the scenario has no method predict")
+        raise ValueError(
+            "nothing is predicted here: the scenario has no predictor, or needs_prediction of the "
+            "learner's settings is false"
+        )
 
 
 UNPREDICTED = Unpredicted()

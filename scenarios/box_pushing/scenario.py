@@ -15,6 +15,7 @@ import numpy as np
 
 from ...core.interface.environments import Transitions
 from ...core.interface.prediction import Prediction
+from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
@@ -72,7 +73,7 @@ class BoxPushing(Scenario):
 
     measures = MEASURES
     regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
-    recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
+    recorded: tuple[str, ...] = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
         expect("settings of box pushing", BoxPushingSettings, settings=settings)
@@ -248,10 +249,7 @@ class BoxPushing(Scenario):
         """Draw the current state, after `reset` the start of an episode, to a picture file."""
         from .pictures.rendering import snapshot
 
-        state = dict(self.measure())
-        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
-        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
-        snapshot(recording | constants, 0, path)
+        snapshot(EpisodeRecorder(self).recording(), 0, path)
 
     def show_policy(
         self,

@@ -16,6 +16,7 @@ import numpy as np
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import EmbodiedPrediction, first_alike
+from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
@@ -61,7 +62,7 @@ class KinematicChain(Scenario):
     """
 
     measures = MEASURES
-    recorded = ("angles", "speeds", "failed")
+    recorded: tuple[str, ...] = ("angles", "speeds", "failed")
 
     def __init__(self, settings: KinematicChainSettings) -> None:
         expect("settings of an arm", KinematicChainSettings, settings=settings)
@@ -193,10 +194,7 @@ class KinematicChain(Scenario):
         """Draw the present posture and the goal to a picture file."""
         from .drawing import snapshot
 
-        state = self.measure()
-        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
-        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
-        snapshot(recording | constants, path)
+        snapshot(EpisodeRecorder(self).recording(), path)
 
     def _reward(self, distance: FloatArray, approach: FloatArray) -> FloatArray:
         """Return the reward ``(m,)`` for distance and approach [m]."""

@@ -74,7 +74,7 @@ def test_the_random_act_without_predictions(spec: Path, capsys: pytest.CaptureFi
     assert [row.steps for row in run_trial(trial).rows] == [3, 3, 3]
     assert main(["check", str(spec), "--set", 'preset="random"']) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert "not checked predictions: the scenario has no method predict" in printed
+    assert "not checked predictions: the scenario Mute has no method predict" in printed
 
 
 def test_settings_say_whether_they_need_predictions() -> None:

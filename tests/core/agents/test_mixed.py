@@ -208,10 +208,12 @@ def test_frequencies_of_a_role_are_the_mean_of_its_agents(line_world) -> None:
         world.roles = ("cart",) * len(world.agents)
     settings = TDLambdaSettings(weights="role")
     former = Team(settings, small, chain_of(small.agents), policy_seed(0))
-    former.only(FuzzyAgents).seen = np.array([[4.0, 0.0, 2.0, 2.0], [0.0, 8.0, 0.0, 0.0]])
+    former.only(FuzzyAgents).action_counts.totals = np.array(
+        [[4.0, 0.0, 2.0, 2.0], [0.0, 8.0, 0.0, 0.0]]
+    )
     successor = Team(settings, large, chain_of(large.agents), policy_seed(1))
     successor.warm_start(former)
-    assert fuzzy(successor).seen.tolist() == [[2.0, 4.0, 1.0, 1.0]] * 3
+    assert fuzzy(successor).action_counts.totals.tolist() == [[2.0, 4.0, 1.0, 1.0]] * 3
 
 
 def test_messages_between_parts_fail_too(world) -> None:
