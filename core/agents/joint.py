@@ -24,6 +24,7 @@ import numpy as np
 
 from ..interface.abilities import Embodiment, horizon_of
 from ..interface.prediction import (
+    Assumptions,
     Blocks,
     EmbodiedPrediction,
     Prediction,
@@ -258,18 +259,9 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
         self._bodies = prediction
         self.groups = prediction.groups
 
-    def assuming(
-        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
-    ) -> JointBodiesPrediction:
-        """Return the prediction for other effects and constants."""
-        return JointBodiesPrediction(self._bodies.assuming(effects, constants), self._joint)
-
-    def with_poses(
-        self, effects: Sequence[FloatArray] | None, weights: Sequence[FloatArray], decisions: int
-    ) -> JointBodiesPrediction:
-        """Return the prediction by learned weights."""
-        prediction = self._bodies.with_poses(effects, weights, decisions)
-        return JointBodiesPrediction(prediction, self._joint)
+    def assuming(self, assumptions: Assumptions) -> JointBodiesPrediction:
+        """Return the prediction under other assumptions."""
+        return JointBodiesPrediction(self._bodies.assuming(assumptions), self._joint)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds that the actions of bodies command."""

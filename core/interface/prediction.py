@@ -167,6 +167,20 @@ def rewards_of(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
     return rewards
 
 
+class Assumptions(NamedTuple):
+    """What agents assume about bodies; where it is None, a prediction keeps its own assumption."""
+
+    effects: Sequence[FloatArray] | None = None
+    """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
+    constants: FloatArray | None = None
+    """``(c,)`` logarithms of factors on the nominal values of the constants."""
+    regressions: Sequence[FloatArray] | None = None
+    """Weights ``(f, t)`` of the regressions that predict poses, see
+    `Embodiment.regression_shapes`."""
+    decisions: int = 1
+    """Number of decisions for which regressions hold the wheel speeds after a joint action."""
+
+
 class EmbodiedPrediction(Prediction):
     """A prediction for assumed effects of actuators, and possibly for assumed constants.
 
@@ -178,27 +192,8 @@ class EmbodiedPrediction(Prediction):
     """Indices of the agents of every body."""
 
     @abstractmethod
-    def assuming(
-        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
-    ) -> EmbodiedPrediction:
-        """Return the prediction from the same states for other effects and constants.
-
-        Parameters
-        ----------
-        effects
-            Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body; None: as here.
-        constants
-            ``(c,)`` logarithms of factors on the nominal values of the constants; None: as here.
-        """
-
-    def with_poses(
-        self, effects: Sequence[FloatArray] | None, weights: Sequence[FloatArray], decisions: int
-    ) -> EmbodiedPrediction:
-        """Return the prediction for assumed effects and the weights ``(f, t)`` of all regressions.
-
-        The wheel speeds after the first joint action are held for a number of decisions.
-        """
-        raise TypeError(f"{type(self).__name__} has no poses to learn")
+    def assuming(self, assumptions: Assumptions) -> EmbodiedPrediction:
+        """Return the prediction from the same states under other assumptions."""
 
     @abstractmethod
     def commands(self, joint_action: IntArray) -> FloatArray:

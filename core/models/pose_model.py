@@ -21,7 +21,7 @@ from .predictors import PosePredictorSettings
 
 
 class PoseModel(Adaptive[EmbodiedPrediction]):
-    """Weights with which bodies predict their poses, see `EmbodiedPrediction.with_poses`.
+    """Weights with which bodies predict their poses, see `Assumptions.regressions`.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..interface.experience import Experience, Observation
-from ..interface.prediction import EmbodiedPrediction, Prediction
+from ..interface.prediction import Assumptions, EmbodiedPrediction, Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray
 from ..plugins.settings import PartSettings
@@ -94,14 +94,16 @@ class TeamModel:
             raise ValueError(
                 "learner.self_model, calibration, decision.errors: the scenario has no bodies"
             )
-        effects = None if self.self_model is None else self.self_model.effects
+        assumed = Assumptions(effects=None if self.self_model is None else self.self_model.effects)
         if self.predictor is not None:
             weights, horizon = self.predictor.weights, self.predictor.horizon
-            return seen.prediction.with_poses(effects, weights, horizon)
-        constants = None if self.calibration is None else self.calibration.constants
-        if errors is not None:
-            constants = errors if constants is None else constants + errors
-        return seen.prediction.assuming(effects, constants)
+            assumed = assumed._replace(regressions=weights, decisions=horizon)
+        else:
+            constants = None if self.calibration is None else self.calibration.constants
+            if errors is not None:
+                constants = errors if constants is None else constants + errors
+            assumed = assumed._replace(constants=constants)
+        return seen.prediction.assuming(assumed)
 
     def learn(self, experience: Experience, prediction: Prediction) -> None:
         """Adapt the models by the outcome of a decision."""

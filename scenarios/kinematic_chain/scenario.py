@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
-from ...core.interface.prediction import EmbodiedPrediction, first_alike
+from ...core.interface.prediction import Assumptions, EmbodiedPrediction, first_alike
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
@@ -314,11 +314,10 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         self._fractions = self.speeds / arm.settings.top_speed
         self._present = angles, speeds, before
 
-    def assuming(
-        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
-    ) -> ChainPrediction:
-        """Return the prediction for other effects of the joints; there are no constants."""
-        return self if effects is None else ChainPrediction(self.arm, effects, *self._present)
+    def assuming(self, assumptions: Assumptions) -> ChainPrediction:
+        """Return the prediction for other effects of the joints."""
+        effects = self.effects if assumptions.effects is None else assumptions.effects
+        return ChainPrediction(self.arm, effects, *self._present)
 
     def view_after(self, joint_actions: IntArray) -> ChainView:
         """Return the arm after joint actions ``(m, n)``."""

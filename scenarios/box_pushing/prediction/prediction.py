@@ -7,14 +7,14 @@ state spaces with the wheel speed as the only own variable that is exact.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
+from ....core.interface.prediction import Assumptions, Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ....core.search.best_response import RespondingPrediction, Responses, Search
@@ -103,24 +103,20 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         self.groups = settings.groups
         self._last: tuple[bytes, SituationBatch] | None = None  # the last request
 
-    def assuming(
-        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
-    ) -> BoxPrediction:
-        """Return the prediction for other effects of the wheels and constants of the push."""
+    def assuming(self, assumptions: Assumptions) -> BoxPrediction:
+        """Return the prediction for other effects, constants of the push or learned pushing."""
         situation = self.situation
-        if effects is not None:
-            situation = replace(situation, effects=tuple(effects))
-        model = self.model if constants is None else model_of(self.settings.belief, constants)
-        return BoxPrediction(situation, model, self.settings)
-
-    def with_poses(
-        self, effects: Sequence[FloatArray] | None, weights: Sequence[FloatArray], decisions: int
-    ) -> BoxPrediction:
-        """Return the prediction by learned pushing, see `poses`."""
-        period = self.settings.period
-        model = self.model._replace(learned=LearnedPush(period, *weights))
-        settings = replace(self.settings, horizon=decisions * period)
-        return BoxPrediction(self.assuming(effects).situation, model, settings)
+        model = self.model
+        settings = self.settings
+        if assumptions.effects is not None:
+            situation = replace(situation, effects=tuple(assumptions.effects))
+        if assumptions.constants is not None:
+            model = model_of(settings.belief, assumptions.constants)
+        if assumptions.regressions is not None:
+            learned = LearnedPush(settings.period, *assumptions.regressions)
+            model = model._replace(learned=learned)
+            settings = replace(settings, horizon=assumptions.decisions * settings.period)
+        return BoxPrediction(situation, model, settings)
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:

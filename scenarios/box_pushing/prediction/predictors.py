@@ -13,13 +13,13 @@ exact
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
+from ....core.interface.prediction import Assumptions
 from ....core.numerics import FloatArray, IntArray
 from ....core.values.rule_base import RuleBase
 from ..states.situations import SituationBatch
@@ -113,12 +113,12 @@ class ExactPrediction(BoxPrediction):
         super().__init__(situation, model, settings)
         self.future = future
 
-    def assuming(
-        self, effects: Sequence[FloatArray] | None, constants: FloatArray | None = None
-    ) -> ExactPrediction:
-        """Return the prediction for other effects of the wheels; the simulation remains."""
-        other = super().assuming(effects, constants)
-        return ExactPrediction(other.situation, other.model, self.settings, self.future)
+    def assuming(self, assumptions: Assumptions) -> BoxPrediction:
+        """Return the prediction under other assumptions, by simulation unless poses are learned."""
+        other = super().assuming(assumptions)
+        if assumptions.regressions is not None:
+            return other
+        return ExactPrediction(other.situation, other.model, other.settings, self.future)
 
     def best_responses(self, rules: RuleBase) -> None:
         """Return None, because every joint action must be simulated."""
