@@ -285,7 +285,7 @@ class StudyData:
         sizes
             Sizes to predict.
         path
-            JSON file to write.
+            JSON file to write, which must not exist.
         measure
             Measure of performance, which is predicted along with the time of the task and costs.
         size
@@ -294,10 +294,12 @@ class StudyData:
         Raises
         ------
         SpecError
-            If a size was run, or nothing can be predicted; one line.
+            If a size was run, nothing can be predicted, or the file exists; one line.
         """
         from ..scalability.prediction import predict
 
+        if Path(path).exists():
+            raise SpecError(f"{path}: exists; a prediction does not replace a file")
         results = self.results_by_size(size)
         name = results.main.name if measure is None else measure
         file, remarks = predict(results, self.outline.table, name, size, sizes)
@@ -315,7 +317,8 @@ class StudyData:
         """
         from ..scalability.prediction import PredictionFile, check
 
-        return check(PredictionFile.read(Path(path)), self.results, self.outline.table)
+        file = PredictionFile.read(Path(path))
+        return check(file, self.results_by_size(file.size), self.outline.table)
 
     def __str__(self) -> str:
         return "\n".join([str(self.table()), "", *self.notes])

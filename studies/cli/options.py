@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
 import click
+from click.core import ParameterSource
 
 if TYPE_CHECKING:
     from ..workers.runner import Backend
@@ -58,6 +59,28 @@ def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
         else:
             name = ""
         yield argument
+
+
+def refuse_unused(mode: str, used: Iterable[str]) -> None:
+    """Refuse options of the command line that the running command does not use in a mode.
+
+    Parameters
+    ----------
+    mode
+        What the mode is called in the message, such as ``with --check``.
+    used
+        Parameters that it uses, by the names of the command's arguments.
+
+    Raises
+    ------
+    click.UsageError
+        If another option is given.
+    """
+    context = click.get_current_context()
+    for option in context.command.params:
+        source = context.get_parameter_source(str(option.name))
+        if source is ParameterSource.COMMANDLINE and option.name not in used:
+            raise click.UsageError(f"{option.opts[0]}: is not used {mode}")
 
 
 def _is_further(argument: str, option: click.Option) -> bool:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..results.results import Results
 from ..results.score_files import NUMBER
@@ -60,9 +60,11 @@ class SizeAxis(NamedTuple):
 
     @classmethod
     def by(cls, key: str, columns: Columns) -> SizeAxis:
-        """Return the axis of a key that all conditions have."""
+        """Return the axis of a key that all conditions have; see `of` for what is refused."""
         places = {}
         for condition, row in columns.items():
+            if not _is_number(row[key]):
+                raise SpecError(f"{key} = {show(row[key])} (condition {condition!r}): is no size")
             n = float(str(row[key]))
             check_size(key.rpartition(".")[2], n, f" (condition {condition!r})")
             places[condition] = label_but(row, [key]), n

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -162,6 +163,8 @@ def rows_of(frame: pd.DataFrame) -> Iterator[tuple[object, ...]]:
 
 
 MATHS_SPACE = r"\;"
+MARKUP = re.compile(r"[\\`*<|$~]|&(?=#?\w+;)|\](?=[(\[])|\b_|_\b")
+"""Characters that Markdown does not show as they are."""
 UNKNOWN = exactly(np.nan)
 
 
@@ -265,11 +268,12 @@ class SummaryTable:
     @property
     def markdown(self) -> str:
         """The whole table in Markdown."""
-        lines = [["condition", "seeds", *self.titles], ["---"] * (2 + len(self.titles))]
+        titles = [*map(_in_markdown, ["condition", "seeds", *self.titles])]
+        lines = [titles, ["---"] * len(titles)]
         for condition, seeds, cells in self.rows:
-            lines.append([condition, str(seeds), *(c.text() if c else "" for c in cells)])
-        escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
-        return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
+            texts = [c.text() if c else "" for c in cells]
+            lines.append([_in_markdown(condition), str(seeds), *texts])
+        return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
     @property
     def html(self) -> str:
@@ -337,7 +341,8 @@ def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> s
     note
         What a comment above the table says besides the package that it needs.
     """
-    style = frame.style.hide(axis="index").format_index(escape="latex", axis=1)
+    clean = frame.assign(**{names: frame[names].map(_in_one_line)}).rename(columns=_in_one_line)
+    style = clean.style.hide(axis="index").format_index(_protected, escape="latex", axis=1)
     text = style.format(_protected, escape="latex", subset=names).to_latex(
         column_format=columns, hrules=True
     )
@@ -345,8 +350,25 @@ def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> s
 
 
 def _protected(text: str) -> str:
-    """Return escaped text that LaTeX does not take for an option of the line before."""
-    return "{}" * text.startswith(("[", "*")) + text.replace(">", "$>$")
+    """Return escaped text that LaTeX does not take for an option of the line before.
+
+    Characters that its default font lacks are set in math mode.
+    """
+    return "{}" * text.startswith(("[", "*")) + re.sub(r"[<>|]", r"$\g<0>$", text)
+
+
+def _in_markdown(text: str) -> str:
+    r"""Return text in which no character is markup, on one line.
+
+    >>> _in_markdown("<b>a|b</b> and\n2 * c")
+    '\\<b>a\\|b\\</b> and 2 \\* c'
+    """
+    return MARKUP.sub(r"\\\g<0>", _in_one_line(text))
+
+
+def _in_one_line(text: str) -> str:
+    """Return text with control characters escaped, and spaces in place of line breaks."""
+    return " ".join(printable(text).split())
 
 
 class Cell(NamedTuple):

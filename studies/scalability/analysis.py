@@ -14,7 +14,7 @@ from ..laws.universal import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law
 from ..results.analysis import Summary
 from ..results.notation import format_estimate, format_number
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
-from .data import COSTS, Place, ScalabilityData, paired
+from .data import COSTS, DECISIONS, Place, ScalabilityData, paired
 from .fronts import (
     BudgetChoice,
     FrontPoint,
@@ -176,6 +176,7 @@ class Scalability:
         )
         yield from self._size_sentences()
         yield from self._crossover_sentences()
+        yield from self._criterion_sentences()
         yield from self._front_sentences()
         yield from self._budget_sentences()
 
@@ -211,6 +212,15 @@ class Scalability:
         other = "other " if self.crossovers else ""
         yield f"There is no {other}crossover up to {data.all_sizes[-1]:g} {data.size}."
 
+    def _criterion_sentences(self) -> Iterator[str]:
+        if self.data.has_criterion:
+            reached = self.data.costs.get(DECISIONS, {})
+            missing = [
+                f"{name}, {n:g}" for name, n in self.data.performances if (name, n) not in reached
+            ]
+            if missing:
+                yield f"Not all seeds reach the criterion: {'; '.join(missing)} {self.data.size}."
+
     def _front_sentences(self) -> Iterator[str]:
         largest = self.data.all_sizes[-1]
         fronts: dict[str, list[str]] = {}
@@ -232,8 +242,13 @@ class Scalability:
     def _budget_sentences(self) -> Iterator[str]:
         for choice in self.choices:
             where = f"Within {self.budget}, with {choice.size:g} {self.data.size}"
+            if choice.unknown:
+                yield (
+                    f"With {choice.size:g} {self.data.size}, a cost of {_join(choice.unknown)} is "
+                    "not known."
+                )
             if choice.hierarchy is None:
-                yield f"{where}, there is no hierarchy."
+                yield f"{where}, there is no {'other ' * bool(choice.unknown)}hierarchy."
             elif len(choice.allowed) == 1:
                 yield f"{where}, there is only {choice.hierarchy}."
             else:

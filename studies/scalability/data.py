@@ -68,6 +68,8 @@ class ScalabilityData:
     where all episodes failed."""
     costs: Mapping[str, Cells]
     """By the name of the cost, see `COSTS`."""
+    has_criterion: bool = False
+    """Whether the decisions to a criterion are among the costs, as far as all seeds reach it."""
 
     @property
     def sign(self) -> float:
@@ -166,6 +168,7 @@ def collect(
         },
         times=_times(results, phase or None, places),
         costs={name: cells for name, cells in costs.items() if cells},
+        has_criterion=criterion is not None,
     )
 
 
@@ -209,6 +212,8 @@ def cost_of(data: ScalabilityData, name: str) -> Cells:
     SpecError
         If it was not measured; one line.
     """
+    if name == DECISIONS and not data.costs.get(name):
+        raise SpecError(f"cost = {name!r}: needs a criterion that all seeds reach somewhere")
     if name not in data.costs:
         raise SpecError(f"cost = {name!r}: was not measured; {closest(name, data.costs)}")
     return data.costs[name]

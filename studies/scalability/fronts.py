@@ -19,7 +19,7 @@ from .data import Cells, ScalabilityData, cost_of, paired
 
 RESAMPLES = 2000
 """Bootstrap resamples of seeds; probabilities are then known to 0.02."""
-LIMIT = re.compile(r"\s*([\w.]+)\s*<=?\s*([0-9.eE+-]+)\s*")
+LIMIT = re.compile(r"\s*([\w.]+)\s*<=\s*([0-9.eE+-]+)\s*")
 """One part of a budget, such as ``messages <= 50``."""
 
 
@@ -46,6 +46,8 @@ class BudgetChoice(NamedTuple):
     """Probability that this choice is the best one within the budget."""
     allowed: tuple[str, ...]
     """Hierarchies within the budget."""
+    unknown: tuple[str, ...] = ()
+    """Hierarchies of which a cost of the budget is not known; none of them is chosen."""
 
 
 def non_dominated(performance: Array, cost: Array) -> BoolArray:
@@ -108,22 +110,25 @@ def parse_budget(text: str) -> dict[str, float]:
     Raises
     ------
     SpecError
-        If a part of it is not ``COST <= NUMBER``; one line.
+        If a part of it is not ``COST <= NUMBER``, or a cost occurs twice; one line.
 
     Examples
     --------
     >>> parse_budget("messages <= 50, decision_ms <= 100")
     {'messages': 50.0, 'decision_ms': 100.0}
     """
-    limits = {}
+    limits: dict[str, float] = {}
     for part in text.split(","):
         match = LIMIT.fullmatch(part)
         try:
-            limits[match[1]] = float(match[2])  # type: ignore[index]
+            cost, limit = match[1], float(match[2])  # type: ignore[index]
         except (TypeError, ValueError):
             raise SpecError(
                 f"budget = {part.strip()!r}: must be COST <= NUMBER, such as messages <= 50"
             ) from None
+        if cost in limits:
+            raise SpecError(f"budget = {text!r}: {cost} stands twice")
+        limits[cost] = limit
     return limits
 
 
@@ -138,43 +143,51 @@ def best_within(data: ScalabilityData, limits: Mapping[str, float]) -> list[Budg
     cells = {name: cost_of(data, name) for name in limits}
     choices = [_choose(data, size, limits) for size in data.all_sizes]
     if all(choice.hierarchy is None for choice in choices):
-        lowest = ", ".join(
-            f"{name} >= {min(float(own.mean()) for own in cells[name].values()):g}"
-            for name in limits
-        )
-        raise SpecError(f"budget: no hierarchy of any size is within it; least measured: {lowest}")
+        lowest = {name: min(float(own.mean()) for own in cells[name].values()) for name in limits}
+        least = ", ".join(f"{name} >= {value:g}" for name, value in lowest.items())
+        raise SpecError(f"budget: no hierarchy of any size is within it; least measured: {least}")
     return choices
 
 
 def _choose(data: ScalabilityData, size: float, limits: Mapping[str, float]) -> BudgetChoice:
-    hierarchies = data.at_size(size)
     measured = [data.costs[cost] for cost in limits]
-    if not all((name, size) in cells for cells in measured for name in hierarchies):
-        return BudgetChoice(size, None, 0.0, ())
+    here = data.at_size(size)
+    hierarchies = [name for name in here if all((name, size) in cells for cells in measured)]
     values, *each = paired_groups([data.performances, *measured], hierarchies, size)
     if not len(values):
-        return BudgetChoice(size, None, 0.0, ())
+        return BudgetChoice(size, None, 0.0, (), here)
+    unknown = tuple(name for name in here if name not in hierarchies)
     values = data.sign * values
     costs = dict(zip(limits, each, strict=True))
-    everyone = np.arange(len(values))[None]
-    best, allowed = _best(values, costs, limits, everyone)
-    if best[0] < 0:
-        return BudgetChoice(size, None, 0.0, ())
+    (best,), (allowed,) = _best(values, costs, limits, np.arange(len(values))[None])
+    if not allowed.any():
+        return BudgetChoice(size, None, 0.0, (), unknown)
     resampled, _ = _best(values, costs, limits, _resample(len(values)))
-    names = tuple(name for name, ok in zip(hierarchies, allowed[0], strict=True) if ok)
-    share = float((resampled == best[0]).mean())
-    return BudgetChoice(size, hierarchies[int(best[0])], share, names)
+    names = tuple(name for name, ok in zip(hierarchies, allowed, strict=True) if ok)
+    choice = int(best.argmax())
+    share = float(resampled[:, choice].mean())
+    return BudgetChoice(size, hierarchies[choice], share, names, unknown)
 
 
 def _best(
     values: Array, costs: Mapping[str, Array], limits: Mapping[str, float], drawn: IntArray
-) -> tuple[IntArray, BoolArray]:
-    """Return the index of the best column within the limits, -1 for none, and those within."""
+) -> tuple[Array, BoolArray]:
+    """Return by resample the share of each column in being the best, and which are within.
+
+    Columns of the same mean share it.
+    """
     allowed = np.ones((len(drawn), values.shape[1]), dtype=bool)
     for name, limit in limits.items():
         allowed &= costs[name][drawn].mean(axis=1) <= limit
     means = np.where(allowed, values[drawn].mean(axis=1), -np.inf)
-    return np.where(allowed.any(axis=1), means.argmax(axis=1), -1), allowed
+    return _shares_of_greatest(means) * allowed, allowed
+
+
+def _shares_of_greatest(means: Array) -> Array:
+    """Return 1 for the greatest value of each row; equal ones share it."""
+    greatest = means == means.max(axis=1, keepdims=True)
+    shares: Array = greatest / greatest.sum(axis=1, keepdims=True)
+    return shares
 
 
 def _resample(n_seeds: int) -> IntArray:
@@ -185,6 +198,5 @@ def probability_of_best(columns: Sequence[Array]) -> Array:
     """Return for each column of paired seeds the probability that its mean is the greatest."""
     values = np.stack(columns, axis=1)
     means = values[_resample(len(values))].mean(axis=1)
-    greatest = means == means.max(axis=1, keepdims=True)
-    shares: Array = (greatest / greatest.sum(axis=1, keepdims=True)).mean(axis=0)
+    shares: Array = _shares_of_greatest(means).mean(axis=0)
     return shares

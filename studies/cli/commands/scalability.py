@@ -15,6 +15,9 @@ from ..loading import read_results, say_remarks
 if TYPE_CHECKING:
     from ...api.study import StudyResults
 
+READING = {"sources", "columns", "where", "trust"}
+"""Parameters that say what is read."""
+
 
 @click.command()
 @options.sources
@@ -82,11 +85,17 @@ def scalability(
     The text names the best team size by the universal scalability law, sizes from which on one
     hierarchy beats another, and the hierarchies on the Pareto front of performance and cost.
     """
+    if check is not None:
+        options.refuse_unused("with --check", READING | {"check", "form"})
+    elif predict:
+        options.refuse_unused("with --predict", READING | {"predict", "out", "measure", "size"})
+    elif out is not None:
+        raise click.UsageError("--out: is not used without --predict")
     loaded = read_results(sources, where=where, trust=trust, columns=columns)
     say_remarks(loaded)
-    if predict or check is not None:
-        if check is not None:
-            return _check(loaded, check, form)
+    if check is not None:
+        return _check(loaded, check, form)
+    if predict:
         if out is None:
             raise click.UsageError("--predict: needs --out FILE.json")
         print_text(*loaded.predict_sizes(predict, out, measure, size=choices["size"]))  # type: ignore[arg-type]

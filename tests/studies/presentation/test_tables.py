@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -58,6 +59,30 @@ def test_markdown_has_chosen_columns_and_keeps_bars_out_of_cells():
         "| [a & b] | 1 | 0 |",
         r"| a\|b | 2 |  |",
     ]
+
+
+HOSTILE = [
+    "a\nb", "a\r\n\r\nb", "\x1b[31mred", "nul\0", r"bar|\|", "<script>x</script>", "$x$ & _u_",
+    r"\end{tabular}", "*star*", "[x](javascript:y)", "&lt;",
+]  # fmt: skip
+
+
+def test_no_label_breaks_a_row_or_is_markup():
+    lines = [Summary(label, 2, {label: estimate(1, 0, 2)}) for label in HOSTILE]
+    table = tabulate(lines)
+    rows = table.markdown.splitlines()
+    assert len(rows) == 2 + len(HOSTILE)
+    for row in rows[:1] + rows[2:]:
+        plain = re.sub(r"\\[\W_]", "", row)
+        assert plain.count("|") == len(HOSTILE) + 3
+        assert not re.search(r"[<*$`\x00\x1b]|\]\(|&lt|\b_u", plain)
+    source = table.latex
+    assert source.isprintable() or set("".join(source.split("\n"))) <= {*map(chr, range(32, 127))}
+    rows = [line for line in source.splitlines() if line.endswith(r"\\")]
+    assert len(rows) == 1 + len(HOSTILE)
+    for row in rows:
+        assert row.replace(r"\&", "").count("&") == len(HOSTILE) + 1
+        assert not re.search(r"(?<!\$)[<>|](?!\$)|end\{", row)
 
 
 def test_a_heading_needs_no_unit():

@@ -66,6 +66,19 @@ def test_the_best_hierarchy_within_a_budget(data):
     assert (four.hierarchy, four.allowed) == ("none", ("none",))
 
 
+def test_a_hierarchy_of_unknown_cost_is_not_chosen_and_does_not_hide_the_others(data):
+    del data.costs["messages"]["none", 4.0]
+    four = best_within(data, {"messages": 50.0})[1]
+    assert (four.hierarchy, four.allowed) == ("tree", ("chain", "tree"))
+    assert four.unknown == ("none",)
+
+
+def test_hierarchies_of_equal_performance_share_the_probability_of_being_the_best(data):
+    data.performances["tree", 2.0] = data.performances["chain", 2.0]
+    two = best_within(data, {"messages": 50.0})[0]
+    assert (two.hierarchy, two.probability) == ("chain", 0.5)
+
+
 def test_no_hierarchy_of_a_size_may_be_within_the_budget(data):
     del data.performances["none", 4.0]
     assert [choice.hierarchy for choice in best_within(data, {"messages": 5.0})] == ["tree", None]
@@ -91,10 +104,17 @@ def test_a_cost_that_was_not_measured_is_refused(data):
         best_within(data, {"decision_ms": 5.0})
 
 
-@pytest.mark.parametrize("text", ["messages", "messages < ", "messages >= 5", "messages <= 1e"])
+@pytest.mark.parametrize(
+    "text", ["messages", "messages < ", "messages < 5", "messages >= 5", "messages <= 1e"]
+)
 def test_a_budget_that_cannot_be_read_is_refused(text):
     with pytest.raises(SpecError, match="must be COST <= NUMBER"):
         parse_budget(text)
+
+
+def test_a_cost_has_one_limit():
+    with pytest.raises(SpecError, match="messages stands twice"):
+        parse_budget("messages <= 5, messages <= 9")
 
 
 def test_probabilities_of_being_best_add_up_to_one():

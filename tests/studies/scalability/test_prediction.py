@@ -2,12 +2,14 @@
 
 import json
 
+import made_up
 import numpy as np
 import pytest
 
 import nested_agents as na
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.scalability.prediction import PredictionFile, check, predict
+from nested_agents.studies.workers.runner import save
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +88,51 @@ def test_commands_predict_and_check(tables, tmp_path, capsys):
     assert "is no prediction file" in capsys.readouterr().err
     assert main(["scalability", small, *columns, "--predict", "16"]) == 2
     assert "--predict: needs --out FILE.json" in capsys.readouterr().err
+
+
+def test_options_that_a_mode_does_not_use_are_refused(tables, tmp_path, capsys):
+    path = tmp_path / "prediction.json"
+    predicted(tables).write(path)
+    small, large = str(tables / "small.csv"), str(tables / "large.csv")
+    columns = ["--columns", "condition=agents"]
+    for option in (["--measure", "scores"], ["--budget", "nothing <= 3"], ["--out", "x.json"]):
+        assert main(["scalability", large, *columns, "--check", str(path), *option]) == 2
+        assert f"{option[0]}: is not used with --check" in capsys.readouterr().err
+    predict = ["--predict", "16", "--out", str(tmp_path / "new.json")]
+    for option in (["--budget", "nothing <= 3"], ["--format", "csv"]):
+        assert main(["scalability", small, *columns, *predict, *option]) == 2
+        assert f"{option[0]}: is not used with --predict" in capsys.readouterr().err
+    assert main(["scalability", small, *columns, *predict, "--check", str(path)]) == 2
+    assert main(["scalability", small, *columns, "--out", str(path)]) == 2
+    assert "--out: is not used without --predict" in capsys.readouterr().err
+
+
+def test_a_prediction_replaces_no_file(tables):
+    small = tables / "small.csv"
+    content = small.read_bytes()
+    with pytest.raises(na.SpecError, match=r"small\.csv: exists"):
+        load(small).predict_sizes([16], small)
+    assert small.read_bytes() == content
+
+
+def test_a_size_that_is_no_number_is_refused(tables, tmp_path):
+    path, scores = tmp_path / "prediction.json", tmp_path / "scores.csv"
+    load(tables / "small.csv").predict_sizes([16], path)
+    scores.write_text("agents,seed,score\n16,0,4.0\n16,1,4.1\nmany,0,5.0\nmany,1,5.1\n")
+    with pytest.raises(na.SpecError, match=r"agents = 'many' .*is no size"):
+        load(scores).check_prediction(path)
+
+
+def test_every_spec_of_several_studies_must_be_that_of_the_prediction(tmp_path):
+    base = {"seeds": 4, "episodes": 3, "steps": 5, "evaluation": 2}
+    for name, sizes, episodes in [("small", [2, 4, 8], 3), ("large", [16], 3), ("other", [32], 4)]:
+        table = base | {"episodes": episodes, "sweep": {"scenario": {"robots": sizes}}}
+        spec = made_up.Spec.of(table)
+        with made_up.opened(tmp_path / name, spec) as store:
+            for trial in made_up.trials_of(spec):
+                save(store, trial, made_up.measure(trial), 1.0)
+    path = tmp_path / "prediction.json"
+    na.load(tmp_path / "small").predict_sizes([16, 32], path, "steps")
+    na.load(tmp_path / "large").check_prediction(path)
+    with pytest.raises(na.SpecError, match=r"episodes = 4, but 3"):
+        na.load(tmp_path / "large", tmp_path / "other").check_prediction(path)
