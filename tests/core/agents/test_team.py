@@ -192,6 +192,8 @@ def test_bounds_of_traces_by_other_rows_are_refused(world) -> None:
 class Witness:
     """Notes what each agent is told, and values its actions by a script."""
 
+    continues = False
+
     def __init__(self, best: list[int]) -> None:
         self.best, self.told = best, {}
         self.counts = Counts()
