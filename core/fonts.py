@@ -1,4 +1,4 @@
-"""Fonts for names in any script: what the usual font lacks is taken from other installed fonts."""
+"""Fonts for any script: missing characters come from other installed fonts."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _lacking(text: Text) -> list[str]:
 def _covering(characters: str) -> tuple[tuple[str, ...], str]:
     """Return families of installed fonts that have characters, and the characters left over.
 
-    The font that has most of what is left comes next.
+    Each next font covers the most of the remaining characters.
     """
     coverage: dict[str, frozenset[str]] = {}
     for path in sorted(font_manager.findSystemFonts()):

@@ -85,7 +85,7 @@ def safe_path() -> Iterator[None]:
 
 
 def restore_child_signal() -> None:
-    """Make this process learn how its children end, also if its own parent ignores SIGCHLD.
+    """Let this process read the exit status of its children, even if its parent ignores SIGCHLD.
 
     Processes inherit an ignored signal. The system then keeps no exit status for `os.waitpid`.
     """

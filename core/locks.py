@@ -1,6 +1,6 @@
 """Locks of open files: those of POSIX systems, or those of Windows.
 
-A lock belongs to the open file, and goes with it however its process ends.
+A lock belongs to the open file and is released when its process ends.
 """
 
 import sys
@@ -11,15 +11,15 @@ if sys.platform == "win32":
     import msvcrt
 
     RETRY = 0.05
-    """How often to try again where a lock is waited for [s]."""
+    """Polling interval while waiting for a lock [s]."""
 
     def lock(file: IO[Any], *, shared: bool = False, wait: bool = False) -> None:
-        """Take the lock of an open file; Windows has none that are shared.
+        """Acquire an exclusive lock; Windows has no shared locks.
 
         Raises
         ------
         BlockingIOError
-            If another has it, and it is not waited for.
+            If another process holds the lock and `wait` is false.
         """
         while True:
             file.seek(0)
@@ -28,22 +28,22 @@ if sys.platform == "win32":
                 return
             except PermissionError as error:
                 if not wait:
-                    raise BlockingIOError(error.errno, "another has the lock") from None
+                    raise BlockingIOError(error.errno, "another process holds the lock") from None
             time.sleep(RETRY)
 
     def lock_record(file: IO[Any]) -> None:
-        """Do nothing: SQLite locks records in its own way here, which all file systems know."""
+        """Do nothing, because SQLite uses its own record locks on Windows."""
 
 else:
     import fcntl
 
     def lock(file: IO[Any], *, shared: bool = False, wait: bool = False) -> None:
-        """Take the lock of an open file, which others can share if they ask for no more.
+        """Acquire a shared or exclusive lock of an open file.
 
         Raises
         ------
         BlockingIOError
-            If another has it, and it is not waited for.
+            If another process holds the lock and `wait` is false.
         OSError
             If the file system has no locks.
         """
@@ -51,5 +51,5 @@ else:
         fcntl.flock(file, kind if wait else kind | fcntl.LOCK_NB)
 
     def lock_record(file: IO[Any]) -> None:
-        """Take the lock of a file's content, as SQLite does; raise OSError if it cannot be had."""
+        """Acquire a record lock, as SQLite does; raise OSError if this fails."""
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -151,17 +151,19 @@ def state_variable(
 
 
 def find_variable(registry: Registry, name: str) -> StateVariable:
-    """Return a state variable of a registry by its name or its place in a user's file.
+    """Return a state variable by its registered name or by ``"file.py:name"``.
+
+    Built-in variables are marked as trusted: their values are not checked.
 
     Raises
     ------
     ValueError
-        If there is no such variable.
+        If there is no such variable, or the name refers to something else.
     """
     try:
         thing = registry.find(name)
         if not isinstance(thing, StateVariable):
-            raise ValueError(f"is no state variable, but a {type(thing).__name__}")
+            raise ValueError(f"is of type {type(thing).__name__}, allowed: state variable")
     except ValueError as error:
         raise ValueError(f"scenario.state_space: {name!r}: {error}") from None
     return replace(thing, trusted=name in registry.built_in)

@@ -89,7 +89,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             settings.predictor, settings.self_model, settings.calibration, scenario
         )
         if settings.is_mirrored and not context.is_whole:
-            raise ValueError("learner.mirrored = true: the mirror image is that of a whole team")
+            raise ValueError("learner.mirrored = true: needs the whole team in one part; use false")
         self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
         self.rows = rows_of(scenario, self.members, shared=settings.weights == "role")
         self._senders = senders_of(settings, hierarchy)

@@ -18,24 +18,24 @@ OF_A_RUN = ("generator", "explorer", "seen", "given")
 
 
 def begin_with(agents: Agents[Any], file: str, part: int) -> None:
-    """Let the agents of a part begin with the weights of a kept team.
+    """Initialize the agents of a part with the weights of a saved team.
 
-    Random numbers, exploration and how often actions were seen are their own. Other learners of the
-    same weights may go on, as ``frozen`` with those of ``batch-td``.
+    Random numbers, exploration and counts of actions stay those of the agents. The learner may
+    differ if the weights fit: ``frozen`` can use those of ``batch-td``.
 
     Parameters
     ----------
     agents
-        They are modified.
+        Agents, modified.
     file
-        That of a kept team, as specs name files.
+        Name of the team's file, as in a spec.
     part
-        Which part of the team they are.
+        Index of the part.
 
     Raises
     ------
     ValueError
-        If it holds nothing that these agents learn, or of other agents; one line.
+        If the file has no weights that fit these agents; one line.
     """
     where = f"learner.parts[{part}].team = {file!r}"
     try:
@@ -47,7 +47,8 @@ def begin_with(agents: Agents[Any], file: str, part: int) -> None:
     own = agents.state_dict()
     learned = _learned(own) & kept.keys()
     if not learned:
-        raise ValueError(f"{where}: holds {', '.join(sorted(kept)) or 'nothing'}, and no weights")
+        content = ", ".join(sorted(kept)) or "nothing"
+        raise ValueError(f"{where}: contains no weights of this learner, but {content}")
     for name in sorted(learned):
         _check_shape(where, name, kept[name], own)
     try:
@@ -61,10 +62,10 @@ def _learned(memory: StateDict) -> set[str]:
 
 
 def _check_shape(where: str, name: str, kept: AnyArray, own: Mapping[str, AnyArray]) -> None:
-    """Refuse weights of other agents; what grows with experience may be of any length."""
+    """Refuse weights of another shape; arrays that grow with experience may have any length."""
     is_weights = name.endswith("theta")
     if is_weights and kept.shape != own[name].shape:
         raise ValueError(
-            f"{where}: its {name} has shape {kept.shape}, that of these agents {own[name].shape}; "
-            "weights of roles (learner.weights = 'role') fit teams of other sizes"
+            f"{where}: {name} has shape {kept.shape}, these agents need {own[name].shape}; "
+            "with learner.weights = 'role', teams of other sizes can share weights"
         )

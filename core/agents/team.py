@@ -156,7 +156,7 @@ class Team:
         if len(self.parts) == 1 and isinstance(self.parts[0], kind):
             return self.parts[0]
         others = ", ".join(type(part).__name__ for part in self.parts)
-        raise ValueError(f"learner.kind: needs {kind.__name__}, the team is of {others}")
+        raise ValueError(f"learner.kind: needs one part of {kind.__name__}; the team has {others}")
 
     @property
     def is_stochastic(self) -> bool:
@@ -414,7 +414,7 @@ class Team:
         Raises
         ------
         ValueError
-            If the file is not of a team of this shape.
+            If the file holds a team of another shape.
         """
         with np.load(path, allow_pickle=False) as arrays:
             self.load_state_dict(dict(arrays))
@@ -477,7 +477,7 @@ def _actions_of_left(failures: Sequence[MessageFailure], scenario: Scenario) -> 
         action = failure.action if isinstance(failure, LeftAgents) else None
         if action is not None and action not in names:
             raise ValueError(
-                f"topology.failures[{k}].action = {action!r}: no action, allowed: "
+                f"topology.failures[{k}].action = {action!r}: unknown action, allowed: "
                 f"{', '.join(names)}"
             )
         actions.append(scenario.action_set.neutral if action is None else names.index(action))

@@ -81,7 +81,9 @@ def _costs(answer: Mapping[str, object], units: Mapping[str, str]) -> dict[str, 
     for name, value in given.items():
         if name not in units:
             known = ", ".join(units) or "none"
-            raise ValueError(f"returns costs.{name}, learner.costs names {known}")
+            raise ValueError(
+                f"returns costs.{name}: unknown cost, allowed: {known} (see learner.costs)"
+            )
         is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
         if not is_number or not np.isfinite(value) or value < 0:
             raise ValueError(f"returns costs.{name} = {value!r:.60}, allowed: numbers from 0")
@@ -100,4 +102,6 @@ def canonical(value: object) -> str:
     try:
         return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"{value!r:.60}: {error}; allowed: what JSON holds") from None
+        raise ValueError(
+            f"{value!r:.60}: {error}; allowed: values that JSON can represent"
+        ) from None

@@ -65,7 +65,9 @@ class Scheduled(Settings):
             raise ValueError("end_step needs an end_episode")
         end = self.end_episode, self.end_step
         if end[0] is not None and end <= (self.episode, self.step):
-            raise ValueError(f"its end {end} must come after its begin {self.episode, self.step}")
+            raise ValueError(
+                f"ends at {end}, allowed: after its beginning at {self.episode, self.step}"
+            )
         return self
 
 

@@ -51,8 +51,8 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     kinds = [k for k in LEARNERS.built_in if k != "mixed"]
     others = [k for k in kinds if not LEARNERS.parsed(k).needs_prediction]
     raise ValueError(
-        f"learner.kind = {settings.kind!r}: decides by predicted states, and {lack}; without it "
-        f"do {', '.join(others)}, and any with learner.predictor.kind = 'learned' or "
+        f"learner.kind = {settings.kind!r}: needs predicted states, but {lack}; use "
+        f"{', '.join(others)}, learner.predictor.kind = 'learned' or "
         "learner.decision.rule = 'random'"
     )
 

@@ -274,7 +274,7 @@ def row_values(theta: FloatArray, active: IntArray, strengths: FloatArray) -> Fl
 @njit(cache=True)
 def aim(
     values: FloatArray,
-    paid: tuple[FloatArray, IntArray, FloatArray],
+    outcomes: tuple[FloatArray, IntArray, FloatArray],
     constants: tuple[float, float, float, float],
     active: IntArray,
     strengths: FloatArray,
@@ -286,16 +286,16 @@ def aim(
     ----------
     values
         ``(N,)`` f of all rows.
-    paid
-        Rewards, followers and weights of all rows, ``(N,)`` each.
+    outcomes
+        Rewards, next rows and weights of all rows, ``(N,)`` each.
     constants
         Discount, trace decay, and the range that targets are clipped to.
     active, strengths
         ``(N, k)`` the active rules of all rows.
     n_rules
-        How many rules there are.
+        Number of rules.
     """
-    rewards, follower, weights = paid
+    rewards, follower, weights = outcomes
     discount, decay, low, high = constants
     returns = lambda_returns(values, rewards, follower, discount, decay)
     moment = np.zeros(n_rules)

@@ -119,11 +119,11 @@ class FittedQSettings(LearnerSettings):
 
 
 class FittedQ(BatchTD, Evaluator):
-    """Fitted Q: learns the values of actions, and tells them.
+    """Fitted Q iteration: learns action values and evaluates actions by them.
 
     Weights are laid out rule by rule, the own action last: ``theta.reshape(-1, A)`` has a column
-    for each action. Their normal equations are sums over what agents did: of each decision only the
-    first time, and for each action by itself.
+    for each action. The normal equations are kept separately for each action. Every decision is
+    added to them once.
     """
 
     def __init__(self, settings: FittedQSettings, rules: RuleBase, rows: IntArray) -> None:
@@ -152,7 +152,7 @@ class FittedQ(BatchTD, Evaluator):
         reward: float | FloatArray,
         terminated: bool,
     ) -> int:
-        """Remember what the agents knew, did and got; regress if the episode has gone on."""
+        """Store a decision with its outcome; regress if an update is due."""
         return self.observe(np.column_stack([left, joint_action]), reward, terminated)
 
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -180,8 +180,8 @@ class FittedQ(BatchTD, Evaluator):
     def _sums(self, row: int, known: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the sums of phi phi' ``(A, k, k)`` of a row, and the weights ``(N,)`` in them.
 
-        What is new is added. The last decision of a running episode has no outcome yet, and is
-        added later.
+        Old sums are reduced by `forgetting`, then new decisions are added. The last decision of a
+        running episode is added later, because its outcome is unknown.
         """
         is_running = self._follower[-1] == len(self._states)
         begin, end = len(self._weights[row]), len(known) - is_running * len(self.members[row])
@@ -211,7 +211,7 @@ class FittedQ(BatchTD, Evaluator):
         self._weights = np.split(state["weights"], state["held"].astype(int)[:-1])
 
     def warm_start(self, former: Self, rows: IntArray) -> None:
-        """Begin with weights and experience of another team, of which no episode is under way.
+        """Start from the weights and experience of another team, between its episodes.
 
         The number of messages may differ: see `carried_weights` and `_with_told`.
 
@@ -235,7 +235,7 @@ class FittedQ(BatchTD, Evaluator):
             self._add(row, taken, strengths, self._weights[row])
 
     def _with_told(self, earlier: Earlier) -> FloatArray:
-        """Return decisions with the number of messages of this team; missing senders are marked."""
+        """Return earlier decisions with this team's number of messages; mark missing senders."""
         states = earlier.states
         missing = max(len(self.rules.partitions) - states.shape[1], 0)
         known = states[:, : len(self.rules.partitions) - 1 - missing]

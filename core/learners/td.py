@@ -94,7 +94,7 @@ class Online(Learner):
         return changed
 
     def end_episode(self) -> int:
-        """Nothing is left to learn."""
+        """Return 0, because every step has been learned already."""
         return 0
 
     @abstractmethod
@@ -130,7 +130,7 @@ class Online(Learner):
 
 
 class FrozenSettings(LearnerSettings):
-    """No learning: the weights stay zero. The control of every learning curve."""
+    """Learner whose weights stay zero, the control of learning curves."""
 
     kind: Literal["frozen"] = "frozen"
     factory: ClassVar[str] = f"{__name__}:Frozen"

@@ -50,7 +50,7 @@ class LearnedPrediction(Prediction):
         key = joint_actions.tobytes()
         if self._last is None or self._last[0] != key:
             own = self._reached[np.arange(joint_actions.shape[1]), joint_actions]
-            drivers = self._predictor.drivers(own, joint_actions)
+            drivers = self._predictor.group_drivers(own, joint_actions)
             shared = self._predictor.after(self.present, drivers)
             self._last = key, (np.ascontiguousarray(own.swapaxes(0, 1)), shared)
         return self._last[1]

@@ -68,10 +68,14 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         self.n_actions = len(scenario.action_set)
         space = self.space
         if not space.shared:
-            raise ValueError("learner.predictor: all state variables are an agent's own")
+            raise ValueError(
+                "learner.predictor: the scenario has no shared variables to predict; use 'given'"
+            )
         self.horizon = settings.horizon or horizon_of(scenario)
         if settings.mirrored and not space.n_own:
-            raise ValueError("learner.predictor.mirrored: without own variables there is no mirror")
+            raise ValueError(
+                "learner.predictor.mirrored = true: needs own state variables; use false"
+            )
         mirrored = settings.mirrored
         if mirrored is None:
             # The mirror image of an action is unknown, that of an own variable is known.
@@ -96,8 +100,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         rules = self.bodies.rules.n_rules
         if k * rules * min(b, 2) > MAX_FEATURES:
             raise ValueError(
-                f"learner.predictor: {k * rules * min(b, 2)} features to regress on, allowed "
-                f"{MAX_FEATURES}; take fewer products or memberships"
+                f"learner.predictor: needs {k * rules * min(b, 2)} regression features, allowed "
+                f"{MAX_FEATURES}; reduce products or memberships"
             )
         r = self.own_rules.n_rules if self.own_rules else 0
         of_own = (self.kinds.max() + 1, self.n_actions, r)
@@ -186,7 +190,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         present = before[:, bodies.agents, bodies.columns]
         where = present + 0.5 * change if self.settings.midpoint else present
         phi = bodies.rules.features(where.reshape(-1, v)).reshape(len(before), b, 1, -1)
-        features = self.drivers(after[..., : self.space.n_own], joint)[..., None] * phi
+        features = self.group_drivers(after[..., : self.space.n_own], joint)[..., None] * phi
         features = features.reshape(len(before), b, -1)
         targets = np.concatenate([change, after[:, bodies.agents, bodies.columns]], axis=2)
         each = features.reshape(len(before) * b, -1)
@@ -239,8 +243,13 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         weights = cho_solve(cho_factor(regular, overwrite_a=True, check_finite=False), moment)
         return weights, (weights * moment).sum(axis=0) + ridge * (weights**2).sum(axis=0)
 
-    def drivers(self, own: FloatArray, joint_actions: IntArray) -> FloatArray:
-        """Return the drivers ``(m, b, k)``: next own variables ``(m, n, n_own)``, or actions."""
+    def group_drivers(self, own: FloatArray, joint_actions: IntArray) -> FloatArray:
+        """Return the drivers ``(m, b, k)`` of bodies of w agents for m joint actions ``(m, n)``.
+
+        They are the predicted next own variables ``(m, n, n_own)``, divided by their limits; k is
+        ``w n_own``. Without own variables they are the actions, each as A zeros and ones, and a
+        constant 1 for each agent; k is ``w (A + 1)``.
+        """
         if self.own_rules is not None:
             each = own / self.limits
         else:

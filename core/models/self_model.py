@@ -90,7 +90,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:
-        """By body, the ``(3, w + 1)`` standard deviations of its effect.
+        """Standard deviations ``(3, w + 1)`` of the effect of every body.
 
         Those of the filters are multiplied by the ratio of actual to expected innovations.
         """

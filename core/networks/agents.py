@@ -76,8 +76,8 @@ class PPOAgents(Agents[PolicyInputs]):
             hierarchy = Hierarchy(scenario.agents, [])
         if hierarchy.neighbors:
             raise ValueError(
-                f"learner.kind = {settings.kind!r}: neighbors act at the same time and tell each "
-                "other nothing; use a topology without neighbors"
+                f"learner.kind = {settings.kind!r}: neighbors decide at the same time and "
+                "send no messages; use a topology without neighbors"
             )
         if context.messages_fail and settings.environments > 1:
             raise ValueError(
@@ -289,9 +289,9 @@ class PPOAgents(Agents[PolicyInputs]):
         saved = {name: select_prefix(f"{name}.", state) for name in self.policies}
         missing = [name for name, own in saved.items() if not own]
         if missing:
-            raise ValueError(f"team: no weights of {missing[0]!r} have been saved")
+            raise ValueError(f"team: the saved state has no weights of {missing[0]!r}")
         if sum(len(own) for own in saved.values()) < len(state) - 1:
-            raise ValueError(f"team: more has been saved than of {', '.join(saved)}")
+            raise ValueError(f"team: the saved state has further policies than {', '.join(saved)}")
         for name, policy in self.policies.items():
             policy.load_state_dict(saved[name])
         set_words(self.rng, state["generator"])

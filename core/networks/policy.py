@@ -132,8 +132,8 @@ class Policy:
         """
         if len(last) != self.settings.environments:
             raise ValueError(
-                f"learner.environments = {self.settings.environments}: learns in so many "
-                f"environments at once, not in {len(last)}"
+                f"learner.environments = {self.settings.environments}: the step has "
+                f"{len(last)} environments, allowed: {self.settings.environments}"
             )
         rollout = self.rollout
         t = rollout.steps

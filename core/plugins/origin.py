@@ -31,10 +31,10 @@ def checked_origin(
     Raises
     ------
     ValueError
-        If it is no function or class, or is defined elsewhere and no subclass of the bases.
+        If it is not a function or class, or is defined elsewhere and not a subclass of `bases`.
     """
     if not (isinstance(thing, type) or isfunction(thing)):
-        raise ValueError(f"is no {kind}, but a {type(thing).__name__}")
+        raise ValueError(f"is of type {type(thing).__name__}, allowed: {kind}")
     if ":" not in reference or (isinstance(thing, type) and issubclass(thing, bases)):
         return thing
     module = module_named(reference)
@@ -45,7 +45,7 @@ def checked_origin(
         is_own = source == reference.rpartition(":")[0]
     if not is_own:
         raise ValueError(
-            f"is no {kind}, but something that {thing.__module__} defines; allowed is what the "
-            "named file or package defines itself"
+            f"is defined in {thing.__module__}; allowed: {kind} that the named file or package "
+            "defines"
         )
     return thing

@@ -33,7 +33,7 @@ def dotted(keys: Keys) -> str:
 
 
 def rule(message: str) -> str:
-    """Return the requirement in a message of pydantic, in words of ours.
+    """Rewrite a message of pydantic as a requirement.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def rule(message: str) -> str:
 def mistaken(key: object, known: Collection[str], problem: str) -> str:
     """Return "; did you mean ...?" if a key that refuses its value is nearly another one's name.
 
-    A value that is only out of range, by the type of the `problem`, is of the right key.
+    An out-of-range value (`problem`) belongs to the right key and gets no hint.
 
     Examples
     --------
@@ -222,11 +222,11 @@ def several(keys: Keys, value: object, text: str, swept_in: str) -> str:
     Examples
     --------
     >>> several(("scenario", "robots"), [2, 4], "must be a whole number", "sweep")
-    '; values to compare stand in sweep'
+    '; put values to compare in sweep'
     """
     is_one = isinstance(value, list | tuple) and len(keys) > 1 and isinstance(keys[-1], str)
     is_meant = swept_in and is_one and "list" not in text
-    return f"; values to compare stand in {swept_in}" if is_meant else ""
+    return f"; put values to compare in {swept_in}" if is_meant else ""
 
 
 def _pointer(keys: Keys, value: object, model: type[BaseModel], table: Table) -> str:
@@ -261,9 +261,9 @@ def _places(
     name: str = "",
     above: tuple[type[BaseModel], ...] = (),
 ) -> Iterator[tuple[str, FieldInfo]]:
-    """Yield the dotted names that a key has in the tables below a model, and its fields.
+    """Yield the dotted name and the field of every occurrence of a key below a model.
 
-    A model that a table may hold within its own is looked through once.
+    A model that can contain itself is searched once.
     """
     for field, info in model.model_fields.items():
         own = table.get(field) if isinstance(table, Mapping) else None
@@ -276,7 +276,7 @@ def _places(
 
 
 def _held(field: FieldInfo, table: object) -> Sequence[type[BaseModel]]:
-    """Return the model that a field's table is for; all that it may be for if it has no kind."""
+    """Return the models that a field's table may have: one if the kind is known, else all."""
     own = model_at(field, table)
     if own is not None:
         return [own]

@@ -160,7 +160,9 @@ class Registry:
         module = sys.modules.get(getattr(defined, "__module__", ""))
         name = str(getattr(defined, "__qualname__", ""))
         if module is None or not name or "<" in name:
-            raise ValueError(f"{thing!r} has no name at the top of a file: write it to one")
+            raise ValueError(
+                f"{thing!r} is not defined at the top level of a file; define it there"
+            )
         if "__source_name__" in vars(module):
             return f"{vars(module)['__source_name__']}:{name}"
         place = f"{module.__name__}:{name}"
@@ -169,7 +171,7 @@ class Registry:
                 return known
         path = getattr(module, "__file__", None)
         if path is None:
-            raise ValueError(f"{name} is defined in no file: write it to one")
+            raise ValueError(f"{name} is defined in an interactive session; save it to a file")
         if module.__package__ or "site-packages" in Path(path).parts:
             return place
         here, there = Path().resolve(), Path(path).resolve()

@@ -112,8 +112,8 @@ def check_team(agents: int, seconds_per_pair: float) -> None:
     seconds = Decimal(seconds_per_pair) * pairs
     if held > MOST_BYTES or seconds > MOST_SECONDS:
         raise ValueError(
-            f"a worker would hold {held / 10**9:.2g} GB, and a decision take {seconds:.2g} s, "
-            f"by estimate, allowed up to {MOST_BYTES // 10**9} GB and {MOST_SECONDS} s"
+            f"needs an estimated {held / 10**9:.2g} GB per worker and {seconds:.2g} s per "
+            f"decision, allowed: up to {MOST_BYTES // 10**9} GB and {MOST_SECONDS} s"
         )
 
 
@@ -239,7 +239,9 @@ class PartSettings(Settings):
             If it cannot be built; one line.
         """
         if not self.factory:
-            raise TypeError(f"{type(self).__name__} has no kind, or its class no factory")
+            raise TypeError(
+                f"{type(self).__name__}: no factory; set `kind` or the class attribute `factory`"
+            )
         factory = self.factory
         return (resolve_name(factory) if isinstance(factory, str) else factory)(self, *given)
 

@@ -178,18 +178,18 @@ class Sources:
         return thing
 
     def content(self, name: str) -> bytes:
-        """Return what is in a file that is no text.
+        """Return the bytes of a saved team.
 
         Raises
         ------
         ValueError
-            If there is no such file, or it is something else.
+            If there is no such file, or it is not a saved team.
         """
         content = b""
         with contextlib.suppress(BinasciiError):
             content = b64decode(self.text(name), validate=True)
         if not content.startswith(ZIPPED):
-            raise ValueError(f"{name}: is no file of a team")
+            raise ValueError(f"{name}: is not a saved team (.npz)")
         return content
 
     def permit(self, module: str) -> None:
@@ -204,8 +204,8 @@ class Sources:
         text = module_text(module)
         if self._brought_by is not None and not is_trusted(text):
             raise ValueError(
-                f"{module}: {self._brought_by} names this module, and none of your specs has "
-                "imported it. It can do whatever you can; --trust imports it"
+                f"{module}: named by {self._brought_by}, but never imported by a spec of yours. "
+                "Imported code has all your permissions; --trust imports it"
             )
         if not self._was_sent:
             trust(text)
@@ -234,7 +234,7 @@ class Sources:
                     self._brought[name] = str(study)
                     break
         if path.exists() and not path.is_file():
-            raise ValueError(f"{name}: is no file")
+            raise ValueError(f"{name}: is not a regular file")
         try:
             if path.stat().st_size > MOST_BYTES:
                 raise ValueError(f"{name}: is larger than allowed, {MOST_BYTES} bytes")
@@ -262,8 +262,8 @@ class Sources:
             return sys.modules[key]
         if name in self._brought and not is_trusted(text):
             raise ValueError(
-                f"{name} came with {self._brought[name]}, and none of your specs has run it. It "
-                "can do whatever you can; --trust runs it"
+                f"{name}: came with {self._brought[name]}, but was never run by a spec of yours. "
+                "It would have all your permissions; --trust runs it"
             )
         if not self._was_sent:
             trust(text)
@@ -373,14 +373,14 @@ def format_error(error: BaseException) -> str:
 
 
 def place(error: BaseException) -> str:
-    """Return the last line in files of the user's that an exception came through, or nothing."""
+    """Return the last line of a user's file in a traceback, or an empty text."""
     frames = [(frame.f_globals, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     places = [(g["__source_name__"], line) for g, line in frames if "__source_name__" in g]
     return f" in line {places[-1][1]} of {places[-1][0]}" if places else ""
 
 
 def message(error: BaseException) -> str:
-    """Return the words of an exception in one line; none if it cannot even say them."""
+    """Return an exception's message in one line; empty if it has none."""
     with contextlib.suppress(Exception):
         return printable(" ".join(str(error).split()))
     return ""

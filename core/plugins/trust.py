@@ -1,13 +1,13 @@
 """Trust in code: code runs if a spec of the user has run it before, or --trust allows it.
 
 A study keeps the files that its spec names, and runs them again when it is explained or continued;
-it may also name modules of installed packages. Of a study that came from somebody else, nothing may
-be run unasked, and no module imported: that code can do whatever the reader can. A digest inside
+it may also name modules of installed packages. Nothing from another person's study is run or
+imported without permission, because that code has the reader's permissions. A digest inside
 the study would protect no user. Code that runs from a user's own spec is therefore recorded, by a
 SHA-256, in a list outside of all studies: ``$XDG_STATE_HOME/nested-agents/trusted``, by default
 below ``~/.local/state``. Code that a study contains or names runs if it is in the list.
 
-Of a file its text is noted; of a module, its name and where its package is, see `module_text`.
+The list records the text of a file, and the name and location of a module (see `module_text`).
 """
 
 import contextlib
@@ -51,7 +51,7 @@ def is_trusted(text: str) -> bool:
 
 
 def trust(text: str) -> None:
-    """Allow what has this text from now on; if no list can be written, only for now."""
+    """Add a text to the trusted list; if it cannot be written, only for this process."""
     if is_trusted(text):
         return
     digest = sha256(text)

@@ -49,14 +49,14 @@ def show(value: object, width: int | None = 60) -> str:
 
 
 def expect(allowed: str, kind: type | UnionType, /, **arguments: object) -> None:
-    """Refuse arguments of a public function that are of no allowed type.
+    """Refuse arguments of a public function with types other than those allowed.
 
     Parameters
     ----------
     allowed
         What is allowed, in words.
     kind
-        The allowed types. Truth values are no numbers.
+        The allowed types. A bool does not count as a number.
     **arguments
         Values by name.
 
@@ -100,7 +100,7 @@ def must_inherit(key: str, thing: object, base: type) -> None:
 
 
 def expect_within(allowed: str, low: float, high: float, /, **arguments: float) -> None:
-    """Refuse numbers outside a closed interval; NaN lies in none.
+    """Refuse numbers outside a closed interval; NaN is refused, too.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def expect_each(
     kind
         The types of it.
     **sequences
-        By name; None has no elements.
+        Sequences by name; None counts as empty.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def expect_each(
 
 
 def expect_pairs(allowed: str, /, **sequences: Iterable[object]) -> None:
-    """Refuse elements of sequences that are no pairs, as `expect_each` does."""
+    """Refuse elements that are not pairs, as `expect_each` does."""
     expect_each(allowed, list | tuple, **sequences)
     for name, pairs in sequences.items():
         for index, pair in enumerate(pairs):

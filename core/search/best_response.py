@@ -37,7 +37,7 @@ from pydantic import Field
 from ..interface.prediction import Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..values.rule_base import PooledWeights, RuleBase
-from .drawing import drawn_equal
+from .drawing import choose_among_equal
 from .enumeration import combinations
 from .evaluator import Aggregation, DecisionContext, DecisionProblem, EvaluatorSettings
 
@@ -46,7 +46,7 @@ CUTS = (0.25, 0.5, 0.75)
 
 
 class Search(NamedTuple):
-    """Input of a joint search of agents that all hear each other."""
+    """Input of one search for agents that all receive each other's actions."""
 
     pooled: PooledWeights
     """Weights of all agents."""
@@ -75,10 +75,10 @@ class RespondingPrediction(Prediction):
 
     @abstractmethod
     def best_responses(self, rules: RuleBase) -> Responses | None:
-        """Return a search that finds the joint action of `BestResponse`; None if there is none.
+        """Return a search with the same result as `BestResponse`, or None.
 
-        It is used where all agents hear each other and decide body by body, by the value of the
-        team. It must draw the same random numbers.
+        It is used if all agents receive all decisions and decide body by body by the value of the
+        team. It must consume the same random numbers.
         """
 
 
@@ -87,9 +87,9 @@ class BestResponseSettings(EvaluatorSettings):
 
     kind: Literal["best-response"] = "best-response"
     sweeps: Annotated[int, Field(ge=0, le=100)] = 1
-    """Rounds in which every body improves the plan before the first decision. Where all agents hear
-    all decisions, the decisions themselves are a round: with 0, decisions take three quarters of
-    the time."""
+    """Rounds in which every body improves the plan before the first decision. If all agents receive
+    all decisions, these are a further round: with 0 rounds, decisions take three quarters of the
+    time."""
 
     def build(self, problem: DecisionProblem) -> Aggregation:
         """Return the evaluator of a team."""
@@ -227,14 +227,11 @@ class BestResponse(Aggregation):
         return values.max(axis=tuple(k for k, i in enumerate(free) if i != agent))
 
     def decide(self, first: DecisionContext, exploring: Exploring) -> IntArray | None:
-        """Return the joint action ``(n,)`` of agents that all hear each other.
-
-        None if the prediction has no search of its own: then the agents decide one by one.
-        """
+        """Return the joint action ``(n,)`` if one search decides for all agents, else None."""
         if not self._decides_jointly:
             return None
         if self.all_values_zero(first):
-            return drawn_equal(self._order, self.n_actions, exploring, first.rng)
+            return choose_among_equal(self._order, self.n_actions, exploring, first.rng)
         prediction = first.prediction
         if not isinstance(prediction, RespondingPrediction):
             return None
@@ -373,8 +370,8 @@ def _check_common_plan(problem: DecisionProblem) -> None:
         )
     if problem.is_private:
         raise ValueError(
-            "learner.decision.plan = 'common': agents with errors or perception of their own "
-            "have no plan in common, use private"
+            "learner.decision.plan = 'common': agents have errors or perception of their "
+            "own, so their plans differ; use private"
         )
 
 

@@ -46,7 +46,7 @@ class VariableEliminationSettings(EvaluatorSettings):
 
 
 class MaxPlusSettings(EvaluatorSettings):
-    """A joint action of a great sum of values over neighbors, by messages between them."""
+    """Approximate maximum of a sum of values over neighbors, by messages between them."""
 
     kind: Literal["max-plus"] = "max-plus"
     rounds: Annotated[int, Field(ge=1, le=10_000)] = 100
@@ -88,8 +88,8 @@ class Coordination(Aggregation):
         hierarchy = problem.hierarchy
         if hierarchy.edges or not hierarchy.neighbors:
             raise ValueError(
-                f"learner.decision.evaluator = {name!r}: the topology joins no neighbors, "
-                "use coordination-graph"
+                f"learner.decision.evaluator = {name!r}: needs neighbors, but the topology has "
+                "none; use coordination-graph"
             )
         required = (
             ("rule", problem.rule, "value"),
@@ -234,6 +234,6 @@ class CrossEntropy(Aggregation):
             for k, joint in enumerate(tried):
                 onward = seen.after(joint)
                 if onward is None:
-                    raise ValueError(f"{type(seen).__name__} does not go on")
+                    raise ValueError(f"{type(seen).__name__} predicts a single decision only")
                 waiting.append((onward, rows[which == k], step + 1))
         return worths

@@ -262,8 +262,7 @@ class MaxPlus:
 
 
 Shape = Literal["line", "ring", "tree", "grid"]
-"""A line; the same, closed; every agent joined with the next two that are free; rows and columns,
-as nearly a square as the number of agents allows."""
+"""A path; a cycle; a binary tree; a grid as close to a square as the number of agents allows."""
 
 
 def build_shape(shape: Shape, n: int) -> nx.Graph:
@@ -284,7 +283,9 @@ def build_shape(shape: Shape, n: int) -> nx.Graph:
 
 
 def other_edges(graph: nx.Graph, seed: int) -> nx.Graph:
-    """Return a graph of as many edges, if there are so many, none of them one of `graph`.
+    """Return a random graph with the same number of edges, none of them in `graph`.
+
+    It has fewer edges if too few pairs are free.
 
     Examples
     --------
@@ -303,8 +304,8 @@ def other_edges(graph: nx.Graph, seed: int) -> nx.Graph:
 def orient(graph: nx.Graph, order: Sequence[str], *, fill_in: bool) -> nx.DiGraph:
     """Return a graph whose edges lead from earlier agents in `order` to later ones.
 
-    With `fill_in`, those who are above an agent are joined, too, from the last agent to the first:
-    eliminating it makes the best that it can do depend on all of them together (Dechter 1999).
+    With `fill_in`, the superiors of each agent are joined to each other, from the last agent to the
+    first. Eliminating an agent makes its best action depend on all of them (Dechter 1999).
 
     Examples
     --------

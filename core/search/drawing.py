@@ -26,8 +26,13 @@ def draw(worths: FloatArray, rng: np.random.Generator) -> int:
 
 
 @njit(cache=True)
-def explored(agent: int, worths: FloatArray, exploring: Exploring, rng: np.random.Generator) -> int:
-    """Return the action of an agent that may explore, as `Bursts.choose`."""
+def choose_action(
+    agent: int, values: FloatArray, exploring: Exploring, rng: np.random.Generator
+) -> int:
+    """Return the agent's action: its held random action, a new one, or the greedy one.
+
+    It equals that of `Bursts.choose` and modifies ``exploring.memory``; -1 if a value is NaN.
+    """
     memory, chance, stop = exploring
     at = 1 + 2 * agent
     if chance >= 0.0:
@@ -35,20 +40,20 @@ def explored(agent: int, worths: FloatArray, exploring: Exploring, rng: np.rando
             memory[at] -= 1.0
             return int(memory[at + 1])
         if rng.random() < chance:
-            action = rng.integers(0, len(worths))
+            action = rng.integers(0, len(values))
             memory[at] = rng.geometric(stop) - 1
             memory[at + 1] = action
             return action  # type: ignore[return-value]  # compiled: an int
-    return draw(worths, rng)
+    return draw(values, rng)
 
 
 @njit(cache=True)
-def drawn_equal(
+def choose_among_equal(
     order: IntArray, n_actions: int, exploring: Exploring, rng: np.random.Generator
 ) -> IntArray:
     """Return the actions ``(n,)`` of agents for whom all actions have the same value."""
     joint = np.empty_like(order)
-    worths = np.zeros(n_actions)
+    values = np.zeros(n_actions)
     for agent in order:
-        joint[agent] = explored(agent, worths, exploring, rng)
+        joint[agent] = choose_action(agent, values, exploring, rng)
     return joint

@@ -60,7 +60,9 @@ def exact_joint_actions(problem: DecisionProblem) -> int:
 
 
 class ExactEnumeration(Aggregation):
-    """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
+    """Evaluates every joint action of an agent and those below it, as in the paper.
+
+    An agent tries ``A ** (1 + len(below))`` joint actions.
 
     Next states come from tables of all joint actions, if the prediction has such tables and all
     agents together evaluate at least that many joint actions.
@@ -79,19 +81,21 @@ class ExactEnumeration(Aggregation):
         n, a = len(self.hierarchy), self.n_actions
         self.check_budget(exact_joint_actions(problem))
         self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
-        self._indices: list[IntArray] = []
-        self._given_places: list[IntArray] = []
+        self._offsets: list[IntArray] = []
+        """By agent, the part of the index of a joint action that it and those below choose."""
+        self._given_strides: list[IntArray] = []
+        """By agent, weights ``(n,)`` of the other actions in the index."""
         self._means: tuple[tuple[object, ...], FloatArray] | None = None
         self._uses_tables = self.hierarchy.count_joint_actions(a) >= a**n
         if self._uses_tables:
-            places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
+            strides = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
             for agent in range(n):
                 below = list(self.hierarchy.searched(agent))
-                own = np.arange(a)[:, None] * places[agent]
-                self._indices.append((own + self._below[agent] @ places[below]).ravel())
-                given = places.copy()
+                own = np.arange(a)[:, None] * strides[agent]
+                self._offsets.append((own + self._below[agent] @ strides[below]).ravel())
+                given = strides.copy()
                 given[[agent, *below]] = 0
-                self._given_places.append(given)
+                self._given_strides.append(given)
 
     def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -110,8 +114,8 @@ class ExactEnumeration(Aggregation):
         if tables is None or (self.problem.rule != "value" and not tables.rewarded):
             return super().worths(context, tried)
         agent = context.agent
-        given = int(context.joint_action @ self._given_places[agent])
-        indices = self._indices[agent] + given
+        given = int(context.joint_action @ self._given_strides[agent])
+        indices = self._offsets[agent] + given
         self.count(agent, len(indices))
         worth = self.combine(
             lambda: tables.reward_table()[indices],

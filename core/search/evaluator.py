@@ -30,7 +30,7 @@ Teammates = Literal["best-response", "uniform", "empirical", "conditional"]
 ValueOf = Literal["own", "below", "team"]
 """Averaged values: the agent's own, its own and those of the agents below, or all agents'."""
 Unseen = Literal["maintain", "last", "plan"]
-"""Assumed behavior of agents that are neither heard nor searched over."""
+"""Assumed behavior of agents whose actions are neither received nor searched over."""
 Plan = Literal["private", "common"]
 """Whether each agent makes its own plan, or all work out the same one."""
 Predicted = Callable[[], FloatArray]

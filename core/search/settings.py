@@ -28,8 +28,8 @@ class DecisionSettings(Settings):
     those of all agents (``team``). Use ``own`` if an agent's state shows the effect of its action,
     ``team`` if an action that helps one agent may hinder others."""
     unseen: Unseen = "maintain"
-    """Assumed actions of agents that this agent neither hears nor searches over, silent agents
-    included: maintain, repeat the last action, or follow the plan of ``best-response``."""
+    """Assumed actions of agents whose actions this agent neither receives nor searches over, silent
+    agents included: maintain, repeat the last action, or follow the plan of ``best-response``."""
     plan: Plan = "private"
     """Plans of ``best-response``: each agent makes its own unless an agent above hands one down
     with its messages (``private``), or all agents compute the same plan from common knowledge."""

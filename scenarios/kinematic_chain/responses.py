@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core.interface.prediction import Exploring
 from ...core.numerics import FloatArray, IntArray, njit
-from ...core.search.drawing import draw, explored
+from ...core.search.drawing import choose_action, draw
 from ..angles import angle_of
 
 
@@ -156,7 +156,7 @@ def respond(
                     values[a] = values[same] if decides else -np.inf
             action = draw(values, rng)
             if decides:
-                action = explored(joint, values, exploring, rng)
+                action = choose_action(joint, values, exploring, rng)
             plan[joint] = action
             pivot = places[0, joint], places[1, joint]
             for i in range(joint + 1, n + 1):

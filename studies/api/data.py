@@ -84,17 +84,19 @@ class StudyData:
     def trials(self) -> pd.DataFrame:
         """One row per trial: its state, durations [s] and numbers of the whole trial.
 
-        ``trials.attrs["columns"]`` describes the columns.
+        ``trials.attrs["columns"]`` describes the columns. It is a copy: changing it changes no
+        result.
         """
-        return self.results.trials
+        return self.results.trials.copy()
 
     @property
     def episodes(self) -> pd.DataFrame:
         """One row per episode, counted from 0, and a column per measure.
 
-        ``episodes.attrs["columns"]`` describes the columns and their units.
+        ``episodes.attrs["columns"]`` describes the columns and their units. It is a copy: changing
+        it changes no result.
         """
-        return self.results.episodes
+        return self.results.episodes.copy()
 
     def table(self, columns: Sequence[str] = ()) -> SummaryTable:
         """Return the table of estimates with 95% intervals, one row per condition.

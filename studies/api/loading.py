@@ -218,7 +218,9 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
             header = published.header_beside(path) if path else None
             own = exported.results_of(table, header and header.description)
             outline = header.outline if header else _outline(own.conditions)
-            results, notes = header.limited(own.results) if header else own.results, own.notes
+            results, notes = own.results, own.notes
+            if header and path:
+                results, notes = header.limited(results), (*header.remarks(path), *notes)
             measure = next(iter(map(str, roles.values())), None)
         else:
             columns = ScoreColumns.of(roles, table.columns)
@@ -253,10 +255,11 @@ def _of_runs(path: Path, runs: Sequence[marl_eval.AlgorithmRun], better: Better)
             _check_better(better)
             own = marl_eval.results_of(runs, better, known, header.measures)
             outline, results = header.outline, header.limited(own.results)
+            notes = (*header.remarks(path), *own.notes)
         else:
             own = marl_eval.results_of(runs, better)
-            outline, results = _outline(own.results.columns), own.results
-    remarks = tuple(f"{path}: {line}" for line in own.notes)
+            outline, results, notes = _outline(own.results.columns), own.results, own.notes
+    remarks = tuple(f"{path}: {line}" for line in notes)
     return StudyResults(outline, results, (), remarks, _defaults=Defaults(by=own.by))
 
 

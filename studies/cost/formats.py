@@ -216,9 +216,9 @@ def _legend(rows: Sequence[CostRow], frame: pd.DataFrame) -> Iterator[str]:
     large = dict.fromkeys(row.topology for row in rows if row.free > auto.exact_up_to)
     if large:
         yield (
-            "The formulas count the evaluator exact. For more than "
-            f"{auto.exact_up_to} agents (one and those below it), the default evaluator auto "
-            "chooses sampling or best-response, which try fewer joint actions. "
+            "The formulas assume an exhaustive search (evaluator exact). If one agent and those "
+            f"below it are more than {auto.exact_up_to}, the default evaluator auto chooses "
+            "sampling or best-response, which try fewer joint actions. "
             f"Rows: {', '.join(large)}."
         )
 

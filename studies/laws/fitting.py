@@ -127,7 +127,7 @@ class Law(NamedTuple):
             (noise / float(self.sample.scale.weight(value)[0]), self._freedom),
         ]
         left = self._drift(x)
-        return _mixed(left.weights, float(value[0]) + left.shifts, left.variances, parts)
+        return _mixture(left.weights, float(value[0]) + left.shifts, left.variances, parts)
 
     @property
     def _freedom(self) -> float:
@@ -156,15 +156,16 @@ class Law(NamedTuple):
         return self.sample.scale.back(self.curve.of(self.parameters, np.log(sizes)))
 
 
-def _mixed(
-    weights: Array, means: Array, variances: Array, parts: Sequence[tuple[float, float]]
+def _mixture(
+    weights: Array, means: Array, variances: Array, estimated: Sequence[tuple[float, float]]
 ) -> Mixture:
-    """Return a mixture of distributions; each of `parts` is a further variance and its freedom.
+    """Return a mixture of Student's distributions.
 
-    Degrees of freedom of sums are Satterthwaite's (1946).
+    `variances` ``(s,)`` are known exactly. `estimated` are further variances, each with its degrees
+    of freedom. Their sum has Satterthwaite's (1946) degrees of freedom, at most `MOST_FREEDOM`.
     """
-    total = variances + sum(part for part, _ in parts) + FLAT**2
-    lack = sum(part**2 / freedom for part, freedom in parts)
+    total = variances + sum(part for part, _ in estimated) + FLAT**2
+    lack = sum(part**2 / freedom for part, freedom in estimated)
     freedoms = np.minimum(total**2 / (lack + FLAT**6), MOST_FREEDOM)
     return Mixture(weights, means, total, freedoms)
 

@@ -137,7 +137,7 @@ def in_csv(frame: pd.DataFrame) -> str:
 
 
 def in_parquet(frame: pd.DataFrame) -> bytes:
-    """Return a frame as a Parquet file; columns of mixed types become text.
+    """Return a frame as a Parquet file with checksums; columns of mixed types become text.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def in_parquet(frame: pd.DataFrame) -> bytes:
         if column.dtype == object and column.dropna().map(type).nunique() > 1
     }
     try:
-        return frame.assign(**mixed).to_parquet()
+        return frame.assign(**mixed).to_parquet(engine="pyarrow", write_page_checksum=True)
     except ImportError:
         raise SpecError(
             "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
@@ -252,7 +252,8 @@ class SummaryTable:
     def json(self) -> str:
         """The whole table as JSON with every digit; unknown bounds are null.
 
-        A row has ``condition``, ``seeds``, and ``value``, ``low`` and ``high`` by title.
+        Each row has ``condition``, ``seeds`` and ``estimates``, which maps each title to its
+        ``value``, ``low`` and ``high``.
         """
         rows = []
         for line in self.lines:

@@ -92,7 +92,7 @@ def methods(
     own = list(settings.values())
     scenarios = [condition["scenario"] for condition in own]
     topologies = [condition["topology"] for condition in own]
-    sentences = [f"Task: {_kinds(scenarios)}{_sizes(scenarios)}."]
+    sentences = [f"Task: {_kinds(scenarios)}{_body_counts(scenarios)}."]
     agents = _distinct(condition.get("agents") or "actuator" for condition in own)
     granularity = (
         "the whole team" if agents == ["team"] else " or ".join(f"each {a}" for a in agents)
@@ -114,8 +114,11 @@ def _kinds(tables: Iterable[Mapping[str, Any]]) -> str:
     return ", ".join(_distinct(str(table["kind"]) for table in tables))
 
 
-def _sizes(scenarios: Sequence[Mapping[str, Any]]) -> str:
-    """Return the numbers of bodies in words, such as " with 2, 4 robots"."""
+def _body_counts(scenarios: Sequence[Mapping[str, Any]]) -> str:
+    """Return the numbers of bodies as text, such as " with 2, 4 robots".
+
+    It is that of the first key in `SIZES` that a scenario sets; empty if none does.
+    """
     for key, name in SIZES.items():
         sizes = sorted({table[key] for table in scenarios if isinstance(table.get(key), int)})
         if sizes:

@@ -75,6 +75,8 @@ def results_of(table: ScoreTable, known: Description | None) -> Exported:
         measures, notes = _measures(frame, names)
     else:
         measures = [m for m in known.measures if m.name in names]
+        missing = ", ".join(m.name for m in known.measures if m.name not in names)
+        notes = [f"no column {missing}, which study.json has"] if missing else []
     return Exported(pack(frame, conditions, measures), conditions, tuple(notes))
 
 

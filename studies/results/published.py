@@ -7,6 +7,7 @@ committed files give the table that the run gave.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -76,6 +77,8 @@ class Header(NamedTuple):
     columns: dict[str, dict[str, str | float | bool | None]]
     measures: tuple[Measure, ...]
     version: int
+    digests: Mapping[str, str]
+    """SHA-256 by name of the tables that were exported with it, as CSV."""
 
     @property
     def note(self) -> str | None:
@@ -83,6 +86,13 @@ class Header(NamedTuple):
         if self.version == RESULTS_VERSION:
             return None
         return f"results of version {self.version}, this is version {RESULTS_VERSION}"
+
+    def remarks(self, path: Path) -> tuple[str, ...]:
+        """Return the note, and that an exported table has been changed."""
+        known = self.digests.get(path.name)
+        is_changed = known not in (None, hashlib.sha256(path.read_bytes()).hexdigest())
+        changed = f"has been changed since it was exported, says {HEADER}"
+        return (*filter(None, [self.note]), *[changed] * is_changed)
 
     def limited(self, results: Results) -> Results:
         """Return results with the limits of the spec."""
@@ -105,7 +115,9 @@ class Header(NamedTuple):
         version = file.child("results_version").whole(1, MOST_VERSION)
         columns = _columns(file.child("columns"))
         outline = _outline(file.child("spec"), columns)
-        return cls(outline, columns, _measures(file.child("measures")), version)
+        kept = file.table().get("sha256")
+        digests = {name: own.text() for name, own in kept.table().items()} if kept else {}
+        return cls(outline, columns, _measures(file.child("measures")), version, digests)
 
 
 def header_beside(path: Path) -> Header | None:

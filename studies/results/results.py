@@ -102,7 +102,7 @@ class Results:
         """Return the numbers of whole trials that a condition has, ``(n_seeds,)`` by name."""
         own = self._finished[condition]
         others = {*TRIAL_COLUMNS, *self.columns.get(condition, ())}
-        return {name: values for name, values in own.items() if name not in others}
+        return {name: values.copy() for name, values in own.items() if name not in others}
 
     def has(self, condition: str, phase: str = "", measure: str = "") -> bool:
         """Return whether a condition has finished trials, episodes of a phase, or a measure."""

@@ -194,13 +194,14 @@ def read_table(path: Path) -> ScoreTable:
             return _read_json_lines(read_text(path))
         if path.suffix == ".parquet":
             check_file(path)
-            return table_of(pd.read_parquet(path))
+            frame = pd.read_parquet(path, engine="pyarrow", page_checksum_verification=True)
+            return table_of(frame)
         return records_table(read_json(read_text(path), JsonNumber))
     except ImportError:
         raise SpecError(f"{path}: Parquet is read by pyarrow: pip install pyarrow") from None
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
         line = str(error).partition("\n")[0]
         raise SpecError(f"{path}: holds no table of scores: {line}") from None
 

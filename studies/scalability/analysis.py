@@ -19,7 +19,7 @@ from .fronts import (
     BudgetChoice,
     FrontPoint,
     best_within,
-    fronts,
+    pareto_points,
     parse_budget,
     probability_of_best,
 )
@@ -103,7 +103,7 @@ class Scalability:
     @cached_property
     def fronts(self) -> tuple[FrontPoint, ...]:
         """Every hierarchy at every size with every cost, and whether it is on the Pareto front."""
-        return tuple(fronts(self.data))
+        return tuple(pareto_points(self.data))
 
     @cached_property
     def choices(self) -> tuple[BudgetChoice, ...]:

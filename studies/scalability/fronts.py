@@ -69,8 +69,11 @@ def non_dominated(performance: Array, cost: Array) -> BoolArray:
     return np.logical_not(np.any(better & cheaper & strictly, axis=-1))
 
 
-def fronts(data: ScalabilityData) -> list[FrontPoint]:
-    """Return all hierarchies at every size with every cost, those on the front marked."""
+def pareto_points(data: ScalabilityData) -> list[FrontPoint]:
+    """Return a point for every cost, size and hierarchy, with its place on the Pareto front.
+
+    A size is left out if fewer than two hierarchies have the cost or if they share no seed.
+    """
     points = []
     for name, cells in data.costs.items():
         for size in data.all_sizes:

@@ -58,7 +58,19 @@ def check_study(path: Path, db: sqlite3.Connection) -> int:
 
 
 def _check_file(path: Path, db: sqlite3.Connection) -> None:
-    """Raise if SQLite finds damage, or the tables are not a study's."""
+    """Raise an error unless the file is an undamaged database of a study.
+
+    Raises
+    ------
+    NoStudyError
+        If the database is empty.
+    DamageError
+        If SQLite finds damage, or there are pages without tables.
+    SpecError
+        If the database is not of a study, or SQLite cannot read it.
+    MemoryError
+        If SQLite runs out of memory.
+    """
     tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
     if not tables:
         (pages,) = db.execute("PRAGMA page_count").fetchone()

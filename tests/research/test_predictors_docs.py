@@ -21,6 +21,9 @@ LAST = "success last 5", "evaluation success"
         ("predictors-teams", TRAINED),
         ("predictors-teams-three", LAST),
         ("predictors-eight", TRAINED),
+        ("poses", TRAINED),
+        ("poses-4", TRAINED),
+        ("poses-8", TRAINED),
         ("predictors-cartpole-fine", (*LAST, "evaluation steps")),
     ],
 )

@@ -91,7 +91,7 @@ def test_a_failure_after_the_last_episode_is_refused(tmp_path, capsys) -> None:
         (lambda: na.BoxPushingSettings(robot=4), "robot = 4: .*; did you mean 'robots'"),
         (lambda: na.BoxPushingSettings(box="hexagn").build(), "did you mean 'hexagon'"),
         (lambda: na.parse_topology(None), "topology None: must be a name, a file or a table"),
-        (lambda: na.build_hierarchy(na.TopologySettings(), "ab"), "has no kind"),
+        (lambda: na.build_hierarchy(na.TopologySettings(), "ab"), "no factory"),
         (lambda: na.parse_topology({"kind": "tems"}), "did you mean 'teams'"),
         (lambda: na.parse_topology({"members": 3}), "topology.members = 3: must be a list"),
     ],
@@ -192,7 +192,7 @@ def test_a_team_that_no_memory_holds_is_refused_in_a_world_of_ones_own(
     (tmp_path / "tank.py").write_text(tank.read_text(encoding="utf-8"))
     (tmp_path / "spec.toml").write_text('scenario = { kind = "tank.py:Tank", pumps = 100_000 }')
     assert main(["plan", "spec.toml", "--no-timed"]) == 2
-    assert "scenario: has 100000 agents: a worker would hold 2.8" in capsys.readouterr().err
+    assert "scenario: has 100000 agents: needs an estimated 2.8" in capsys.readouterr().err
 
 
 def test_a_file_that_cannot_be_written_is_called_by_its_own_name(

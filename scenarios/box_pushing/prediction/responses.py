@@ -14,7 +14,7 @@ import numpy as np
 
 from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
-from ....core.search.drawing import draw, explored
+from ....core.search.drawing import choose_action, draw
 from ....core.values.triangular import summed_values
 from ..states.situations import SituationBatch
 from ..states.variables import evaluate
@@ -160,7 +160,7 @@ def _decide(
             return -1
         for a in range(n_actions):
             by_action[a] = left[a * places : (a + 1) * places].max()
-        joint[j] = explored(robot * wheels + j, by_action, exploring, rng)
+        joint[j] = choose_action(robot * wheels + j, by_action, exploring, rng)
         if joint[j] < 0:
             return -1
         action = action * n_actions + joint[j]

@@ -197,7 +197,7 @@ def courses_of(results: Results) -> list[Course]:
         for phase in (KEPT, "training"):
             course = failure_course(results, condition, phase)
             adapts = ADAPTS.get((enabled, phase), phase)
-            spans = _spans(results.numbers(condition))
+            spans = _failure_spans(results.numbers(condition))
             courses.append(Course(fault, adapts, spans, course, results.step_limits.training))
     order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
     faults = distinct(course.fault for course in courses)
@@ -219,8 +219,11 @@ def _numbers_of(spans: Iterable[FailureSpan]) -> dict[str, float]:
     return numbers
 
 
-def _spans(numbers: Mapping[str, Array]) -> tuple[FailureSpan, ...]:
-    """Return the begin and end of failures from numbers of a trial, see `_numbers_of`."""
+def _failure_spans(numbers: Mapping[str, Array]) -> tuple[FailureSpan, ...]:
+    """Return begin and end [episodes] of every failure, the inverse of `_numbers_of`.
+
+    Each array has a value for every seed. All seeds have the same failures.
+    """
     spans = []
     for name, values in numbers.items():
         if name.startswith("onset"):

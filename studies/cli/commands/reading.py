@@ -1,5 +1,6 @@
 """Commands that read a study, or several: what it measured, how far it is, what was learned."""
 
+import hashlib
 import io
 import json
 from pathlib import Path
@@ -255,15 +256,17 @@ def _contents(store: Store, form: Files) -> dict[str, bytes]:
         with sources_of(store).active():
             kept = select_published(outline.study, results)
         return {"results.json": published.dumps(outline, kept).encode()}
-    header = json.dumps(published.header(outline, results), indent=1)
+    frames = {"episodes": results.episodes, "trials": results.trials}
+    tables = {f"{name}.csv": in_csv(frame).encode() for name, frame in frames.items()}
+    digests = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
+    header = json.dumps(published.header(outline, results) | {"sha256": digests}, indent=1)
     described = {published.HEADER: f"{header}\n".encode()}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
         text = marl_eval.dumps(results, kinds, outline.study)
         return {"marl-eval.json": text.encode()} | described
-    frames = {"episodes": results.episodes, "trials": results.trials}
     if form == "csv":
-        return {f"{n}.csv": in_csv(frame).encode() for n, frame in frames.items()} | described
+        return tables | described
     return {f"{n}.parquet": in_parquet(frame) for n, frame in frames.items()} | described
 
 

@@ -101,7 +101,7 @@ def test_agents_without_errors_that_tell_expect_what_is_done(world) -> None:
     ("decision", "problem"),
     [
         ({"errors": ErrorSettings(constants=0.1)}, "learner.decision.errors.constants = 0.1: "),
-        ({"errors": ErrorSettings(), "plan": "common"}, "no plan in common"),
+        ({"errors": ErrorSettings(), "plan": "common"}, "so their plans differ"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(world, decision, problem: str) -> None:

@@ -146,5 +146,7 @@ def test_functions_that_are_absent_are_not_called_either() -> None:
 
 
 def test_an_action_that_there_is_not_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"topology\.failures\[0\]\.action = 'jump': no action, a"):
+    with pytest.raises(
+        ValueError, match=r"topology\.failures\[0\]\.action = 'jump': unknown action, a"
+    ):
         carts([LeftAgents(agents="cart1", action="jump")], {"kind": "td-lambda"})

@@ -320,7 +320,7 @@ def test_policies_of_probabilities_are_evaluated_by_sampled_actions_too() -> Non
 
 
 def test_what_cannot_be_passed_down_is_refused() -> None:
-    problem = "neighbors act at the same time and tell each other nothing"
+    problem = "neighbors decide at the same time and send no messages"
     with pytest.raises(SpecError, match=problem) as raised:
         check_conditions(spec_of("simultaneous"))
     assert "\n" not in str(raised.value)

@@ -128,7 +128,7 @@ def test_arrays_of_other_teams_are_refused(name: str) -> None:
 def test_arrays_of_more_policies_are_refused() -> None:
     settings = [spec_of(name).conditions()[0].settings for name in ("own weights", "ippo")]
     own, every = (arrange(each, 0).team for each in settings)
-    with pytest.raises(ValueError, match=r"^team: more has been saved than of all$"):
+    with pytest.raises(ValueError, match=r"^team: the saved state has further policies than all$"):
         every.load_state_dict({**own.state_dict(), **every.state_dict()})
 
 
@@ -301,6 +301,8 @@ def test_agents_learn(kind: str) -> None:
 
 def test_code_that_needs_rule_bases_says_so() -> None:
     team = arrange(spec_of("ppo").conditions()[0].settings, 0).team
-    with pytest.raises(ValueError, match="needs FuzzyAgents, the team is of Central") as raised:
+    with pytest.raises(
+        ValueError, match="needs one part of FuzzyAgents; the team has Central"
+    ) as raised:
         team.only(FuzzyAgents)
     assert "\n" not in str(raised.value)

@@ -144,7 +144,7 @@ def test_a_class_with_settings_of_its_own_gets_them(carts: SettingsRegistry) -> 
     [
         ("Foreign", r"^is no cart: it needs a class Settings that inherits \S+\.CartSettings$"),
         ("Bare", r"^is no cart: it needs a class Settings that inherits \S+\.CartSettings$"),
-        ("NUMBER", r"^is no cart, but a int$"),
+        ("NUMBER", r"^is of type int, allowed: cart$"),
     ],
 )
 def test_what_is_no_cart_is_refused(name: str, complaint: str, carts: SettingsRegistry) -> None:
@@ -216,10 +216,12 @@ def test_an_object_becomes_the_name_of_its_place(
 def test_an_object_without_a_place_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     things = Registry("thing", {})
     typed = module_of(monkeypatch, "__console__", None, "class Thing:\n    pass\n")
-    with pytest.raises(ValueError, match=r"^Thing is defined in no file: write it to one$"):
+    with pytest.raises(
+        ValueError, match=r"^Thing is defined in an interactive session; save it to a file$"
+    ):
         things.reference_to(typed)
     for nameless in (lambda: None, 3):
-        with pytest.raises(ValueError, match="has no name at the top of a file: write it to one"):
+        with pytest.raises(ValueError, match="is not defined at the top level of a file"):
             things.reference_to(nameless)
 
 

@@ -59,7 +59,9 @@ def test_agents_who_are_told_nothing_agree_on_one_of_two_optima(evaluator):
 
 @pytest.mark.parametrize("evaluator", KINDS)
 def test_what_it_does_not_evaluate_is_refused(evaluator):
-    with pytest.raises(ValueError, match="joins no neighbors, use coordination-graph"):
+    with pytest.raises(
+        ValueError, match="needs neighbors, but the topology has none; use coordination-graph"
+    ):
         team_of(evaluator, "chain")
     for key, value in (("rule", "reward"), ("teammates", "uniform"), ("value_of", "team")):
         with pytest.raises(ValueError, match=rf"decision\.{key} = '{value}': {evaluator} adds up"):

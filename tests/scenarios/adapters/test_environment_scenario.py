@@ -439,8 +439,8 @@ def test_check_and_run_say_it_in_one_line(
     for command in (["check", str(path)], ["run", str(path), "--out", str(tmp_path / "out")]):
         assert main(command) == 2
         (line,) = capsys.readouterr().err.splitlines()
-        assert "learner.kind = 'batch-td': decides by predicted states" in line
-        assert "scenario.predictor = 'none' gives none ('copy' does); without it do" in line
+        assert "learner.kind = 'batch-td': needs predicted states" in line
+        assert "scenario.predictor = 'none' gives none ('copy' does); use" in line
     assert not (tmp_path / "out").exists()
 
 

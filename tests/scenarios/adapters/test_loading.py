@@ -87,7 +87,7 @@ def test_a_study_keeps_the_file_and_asks_for_trust(
     [
         (PettingZooSettings(id=f"{FILE}:Cart"), "is one of scenario.kind = 'gymnasium'"),
         (GymnasiumSettings(id=f"{FILE}:Walkers"), "is one of scenario.kind = 'pettingzoo'"),
-        (GymnasiumSettings(id=f"{FILE}:LENGTH"), "is no environment, but a int"),
+        (GymnasiumSettings(id=f"{FILE}:LENGTH"), "is of type int, allowed: environment"),
         (GymnasiumSettings(id=f"{FILE}:Nobody"), f"{FILE} has no 'Nobody'"),
         (GymnasiumSettings(id=FILE), "must be written path/to/file.py:name"),
         (GymnasiumSettings(id="nothing.py:Cart"), "nothing.py: No such file"),

@@ -114,15 +114,15 @@ def test_other_weights_are_another_trial(kept: Path) -> None:
         (
             {**LEARNER, "weights": "own"},
             None,
-            r"learner\.parts\[0\]\.team = .* its learner\.theta has",
+            r"learner\.parts\[0\]\.team = .* learner\.theta has",
         ),
         (
             {"kind": "frozen", "weights": "own"},
             None,
-            r"weights of roles .* fit teams of other sizes",
+            r"'role', teams of other sizes can share weights",
         ),
         (LEARNER, b"PK nothing", r"learner\.parts\[0\]\.team = .*"),
-        (LEARNER, b"text", r"trained\.npz: is no file of a team"),
+        (LEARNER, b"text", r"trained\.npz: is not a saved team"),
     ],
 )
 def test_a_file_that_holds_no_such_weights_is_refused(kept, learner, content, complaint) -> None:

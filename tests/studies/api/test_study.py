@@ -1,5 +1,6 @@
 """A study in Python, with made-up results: nothing here simulates."""
 
+import pickle
 from dataclasses import replace
 
 import made_up
@@ -61,6 +62,23 @@ def test_rows_are_data_frames_whose_columns_are_told(study) -> None:
     part = study.where("seed < 2 and condition == 'frozen'")
     assert set(part.episodes["seed"]) == {0, 1}
     assert len(part.trials) == 2
+
+
+def test_what_a_user_changes_changes_no_result(study, places) -> None:
+    episodes, trials = study.episodes, study.trials
+    episodes["success"] = True
+    episodes.attrs["columns"].clear()
+    trials.loc[:, "state"] = "failed"
+    for condition in study.conditions:
+        study.results.values(condition, "success")[:] = 1
+        for values in study.results.numbers(condition).values():
+            values[:] = 0
+    untouched = na.load(places[0])
+    assert str(study) == str(untouched)
+    assert study.episodes.equals(untouched.episodes)
+    assert study.trials.equals(untouched.trials)
+    assert study.episodes.attrs == untouched.episodes.attrs
+    assert str(pickle.loads(pickle.dumps(study)).compare()) == str(untouched.compare())
 
 
 def test_conditions_are_compared(study) -> None:

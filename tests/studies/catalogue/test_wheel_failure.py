@@ -114,7 +114,7 @@ def test_the_end_of_a_transient_failure_is_marked(tmp_path: Path) -> None:
 def test_spans_of_failures_survive_as_numbers() -> None:
     spans = [(9, 12), (5, None), (7, 8)]
     numbers = {name: np.array([value]) for name, value in module._numbers_of(spans).items()}
-    assert module._spans(numbers) == ((5, None), (7, 8), (9, 12))
+    assert module._failure_spans(numbers) == ((5, None), (7, 8), (9, 12))
 
 
 def test_cases_are_told_apart_by_what_adapts() -> None:

@@ -1,5 +1,6 @@
 """Every exported file of every installed study is read to the verdict of the study itself."""
 
+import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -104,6 +105,49 @@ def test_the_order_of_rows_and_columns_does_not_matter(study: Path, tmp_path: Pa
     (tmp_path / "study.json").unlink()
     first = na.load(study).conditions[0]
     assert verdict(na.load(path), reference=first).splitlines()[-1:]
+
+
+def test_a_changed_table_and_an_older_version_are_told(study: Path, tmp_path: Path) -> None:
+    for form in ("csv", "marl-eval"):
+        assert main(["export", str(study), "--out", str(tmp_path), "--format", form]) == 0
+    assert not na.load(tmp_path / "episodes.csv").remarks
+    path, header = tmp_path / "episodes.csv", tmp_path / "study.json"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+    assert any("changed since" in remark for remark in na.load(path).remarks)
+    table = json.loads(header.read_text()) | {"results_version": 1}
+    header.write_text(json.dumps(table))
+    for name in ("episodes.csv", "trials.csv", "marl-eval.json"):
+        remarks = na.load(tmp_path / name).remarks
+        assert any("results of version 1" in remark for remark in remarks)
+
+
+def test_damage_of_a_parquet_file_is_refused_or_of_no_value(study: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow", reason="extra [parquet]")
+    assert main(["export", str(study), "--out", str(tmp_path), "--format", "parquet"]) == 0
+    path = tmp_path / "trials.parquet"
+    content = path.read_bytes()
+    expected = na.load(path).trials
+    footer = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
+    refused = 0
+    for place in (*range(4, footer, 397), *range(footer, len(content), 1201)):
+        damaged = bytearray(content)
+        damaged[place] ^= 1
+        path.write_bytes(damaged)
+        try:
+            read = na.load(path).trials
+        except SpecError:
+            refused += 1
+        else:
+            assert place > footer or read.set_axis(expected.columns, axis=1).equals(expected)
+    assert refused
+
+
+def test_a_missing_column_is_told(study: Path, tmp_path: Path) -> None:
+    assert main(["export", str(study), "--out", str(tmp_path)]) == 0
+    path = tmp_path / "episodes.csv"
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    table.drop(columns="final_distance_m").to_csv(path, index=False)
+    assert any("no column final_distance_m" in remark for remark in na.load(path).remarks)
 
 
 def test_a_table_without_its_description_gives_the_same_verdict(study: Path, tmp_path) -> None:

@@ -91,7 +91,7 @@ def test_nothing_that_came_with_a_study_is_run_unasked(
         assert main(line) == 2, line
         _, error = capsys.readouterr()
         assert error.count("\n") == 1
-        assert "mine.py came with" in error
+        assert "mine.py: came with" in error
         assert "--trust" in error
     # A spec of one's own that names another file of that name.
     (tmp_path / "mine.py").write_text("def ring(agents, groups): return []\n")
@@ -139,7 +139,7 @@ def test_the_kept_spec_runs_elsewhere_with_the_copies_beside_it(
 ) -> None:
     again = ["run", str(foreign / SPEC_FILE), "--out", str(tmp_path / "again"), "--jobs", "1"]
     assert main(again) == 2
-    assert f"mine.py came with {foreign}" in capsys.readouterr().err
+    assert f"mine.py: came with {foreign}" in capsys.readouterr().err
     assert main([*again, "--trust"]) == 0
 
 
@@ -167,7 +167,7 @@ def test_files_beside_a_kept_spec_are_somebody_elses_too(
     line = [command, str(foreign / SPEC_FILE), *out]
     assert main(line) == 2
     error = capsys.readouterr().err
-    assert f"{place}/evil.py came with {foreign}" in error
+    assert f"{place}/evil.py: came with {foreign}" in error
     assert error.count("\n") == 1
     assert not mark.exists()
     main([*line, "--trust"])
@@ -366,9 +366,7 @@ def test_a_file_of_results_that_names_a_module_is_refused(
 
 def test_an_environment_of_somebody_elses_module_is_refused() -> None:
     table = {"scenario": {"kind": "gymnasium", "id": "payload.worlds:World-v0"}}
-    with pytest.raises(
-        SpecError, match=r"^scenario\.id: payload\.worlds: theirs names this module"
-    ):
+    with pytest.raises(SpecError, match=r"^scenario\.id: payload\.worlds: named by theirs"):
         Spec.of(table, Sources(None, brought_by="theirs"))
     Spec.of(
         {"scenario": {"kind": "pettingzoo", "id": "mpe2/simple_spread_v3"}},
@@ -387,5 +385,5 @@ def test_a_module_of_ones_own_spec_is_trusted_where_it_is(
         Sources(reader).permit("payload.parts")
         Sources(None, brought_by="theirs").permit("payload.parts")
     monkeypatch.syspath_prepend(reader / "other")
-    with pytest.raises(ValueError, match=r"payload\.parts: theirs names this module"):
+    with pytest.raises(ValueError, match=r"payload\.parts: named by theirs"):
         Sources(None, brought_by="theirs").permit("payload.parts")

@@ -9,8 +9,8 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.scalability.data import ScalabilityData, paired
 from nested_agents.studies.scalability.fronts import (
     best_within,
-    fronts,
     non_dominated,
+    pareto_points,
     parse_budget,
     probability_of_best,
 )
@@ -48,15 +48,15 @@ def test_a_point_is_beaten_only_if_another_is_no_worse_in_both_and_better_in_one
 
 
 def test_the_front_of_every_size(data):
-    on_front = {(p.size, p.hierarchy) for p in fronts(data) if p.on_front}
+    on_front = {(p.size, p.hierarchy) for p in pareto_points(data) if p.on_front}
     assert on_front == {(2.0, "chain"), (2.0, "tree"), (2.0, "none"), (4.0, "tree"), (4.0, "none")}
-    assert {p.probability for p in fronts(data)} == {0.0, 1.0}
+    assert {p.probability for p in pareto_points(data)} == {0.0, 1.0}
 
 
 def test_seeds_that_differ_make_the_front_uncertain(data):
     values = pd.Series(np.linspace(0.5, 1.1, 8), SEEDS)
     data.performances["chain", 4.0] = values
-    (chain,) = [p for p in fronts(data) if (p.size, p.hierarchy) == (4.0, "chain")]
+    (chain,) = [p for p in pareto_points(data) if (p.size, p.hierarchy) == (4.0, "chain")]
     assert 0.2 < chain.probability < 0.8
 
 
@@ -90,8 +90,8 @@ def test_seeds_are_paired_by_name_between_performance_and_cost(data):
     for name in ("chain", "tree", "none"):
         data.performances[name, 4.0] = performance
         data.costs["messages"][name, 4.0] = cost
-    assert {p.performance for p in fronts(data) if p.size == 4.0} == {0.0}
-    assert {p.cost_value for p in fronts(data) if p.size == 4.0} == {9.0}
+    assert {p.performance for p in pareto_points(data) if p.size == 4.0} == {0.0}
+    assert {p.cost_value for p in pareto_points(data) if p.size == 4.0} == {9.0}
 
 
 def test_a_budget_below_everything_says_what_was_measured(data):

@@ -486,7 +486,7 @@ def test_edges_beside_neighbors_have_no_table():
     ],
 )
 def test_a_list_where_one_value_stands_is_pointed_to_the_sweep(wrong):
-    with pytest.raises(SpecError, match=r"values to compare stand in sweep$"):
+    with pytest.raises(SpecError, match=r"put values to compare in sweep$"):
         Spec.read({"study": "scaling", "seeds": 2, **wrong})
 
 
@@ -639,16 +639,19 @@ def test_a_value_out_of_range_is_not_taken_for_that_of_another_key() -> None:
 @pytest.mark.parametrize(
     ("scenario", "estimate"),
     [
-        ({"robots": 3000}, "robots = 3000: a worker would hold 1.2 GB, and a decision take 27 s"),
-        ({"robots": 10**999}, r": a worker would hold 1.1e\+1991 GB, and a decision take 3.0e"),
+        (
+            {"robots": 3000},
+            "robots = 3000: needs an estimated 1.2 GB per worker and 27 s per decision",
+        ),
+        ({"robots": 10**999}, r": needs an estimated 1.1e\+1991 GB per worker and 3.0e"),
         (
             {"kind": "kinematic-chain", "joints": 6000},
-            "joints = 6000: a worker would hold 1.2 GB, and a decision take 0.36 s",
+            "joints = 6000: needs an estimated 1.2 GB per worker and 0.36 s per decision",
         ),
     ],
 )
 def test_a_team_too_large_for_a_worker_is_refused_by_an_estimate(scenario, estimate) -> None:
-    allowed = ", by estimate, allowed up to 1 GB and 5 s$"
+    allowed = ", allowed: up to 1 GB and 5 s$"
     with pytest.raises(SpecError, match=estimate + ".*" + allowed):
         Spec.of({"scenario": scenario})
     assert Spec.of({"scenario": {"robots": 512}})

@@ -234,7 +234,7 @@ def test_variables_of_users_stand_beside_compiled_ones() -> None:
     [
         (
             "mine.py:number",
-            "scenario.state_space: 'mine.py:number': is no state variable, but a int",
+            "scenario.state_space: 'mine.py:number': is of type int, allowed: state variable",
         ),
         ("mine.py:nothing", "scenario.state_space: 'mine.py:nothing': .* has no 'nothing'"),
         ("other.py:gap", "scenario.state_space: 'other.py:gap': "),
