@@ -14,6 +14,7 @@ from ..hierarchy.failures import LeftAgents, MessageFailure
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
 from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
+from ..interface.abilities import options_of
 from ..interface.agents import (
     AgentContext,
     Agents,
@@ -39,6 +40,7 @@ from ..plugins.settings import Settings
 from ..plugins.words import expect
 from .inspection import inspect_agents
 from .kept import begin_with
+from .leader import Leader
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
@@ -70,6 +72,8 @@ class Team:
         The agents, one part for each kind.
     needs_prediction
         Whether some agents decide or learn by the scenario's predictions.
+    leader
+        The leader above all agents, if the scenario has options for one.
     messages
         Delivery of messages.
     costs
@@ -134,6 +138,15 @@ class Team:
         )
         self._present = hierarchy
         self._actions_of_left = _actions_of_left(failures, checked)
+        self.leader = None
+        self._scenario: Scenario = checked
+        self._options = options_of(checked)
+        if self._options is not None:
+            if failures or settings.n_environments > 1:
+                key = "topology.failures" if failures else "learner.environments"
+                raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
+            self.leader = Leader(self._options, seed.spawn(1)[0])
+        self._all = self.parts if self.leader is None else (*self.parts, *self.leader.agents)
 
     @cached_property
     def _stages(self) -> tuple[DecisionStage, ...]:
@@ -167,7 +180,7 @@ class Team:
     def counts(self) -> Counts:
         """Number of evaluations so far, of the parts that count them."""
         total = Counts()
-        for part in self.parts:
+        for part in self._all:
             if isinstance(part, ReportsResources):
                 total.add(part.counts)
         return total
@@ -179,13 +192,13 @@ class Team:
             part.weight_bytes
             if isinstance(part, ReportsResources)
             else sum(array.nbytes for array in part.state_dict().values())
-            for part in self.parts
+            for part in self._all
         )
 
     @contextmanager
     def drawing_apart(self) -> Iterator[None]:
         """Restore the states of all random generators on exit."""
-        generators = [part.rng.bit_generator for part in self.parts]
+        generators = [part.rng.bit_generator for part in self._all]
         states = [generator.state for generator in generators]
         yield
         for generator, state in zip(generators, states, strict=True):
@@ -219,8 +232,16 @@ class Team:
         Raises
         ------
         ValueError
-            If the scenario predicts something that is no prediction; one line.
+            If the scenario predicts something that is no prediction, or has no leader where the
+            team has one; one line.
         """
+        if previous is None:  # an episode begins
+            self._options = options_of(scenario)
+            if (self.leader is None) != (self._options is None):
+                raise ValueError(
+                    "scenario.leader: build the team in a scenario with the same leader"
+                )
+            self._scenario = scenario
         prediction = prediction_of(scenario) if self.needs_prediction else UNPREDICTED
         return Observation(states, prediction, previous)
 
@@ -232,7 +253,9 @@ class Team:
         Random message failures follow from `seed`.
         """
         self.messages.reset(seed, episode)
-        for part in self.parts:
+        if self.leader is not None:
+            self.leader.reset()
+        for part in self._all:
             part.reset(episode, learn=learn)
 
     def act(
@@ -268,6 +291,16 @@ class Team:
             self._rearrange()
         if inspect and observation.states.ndim > 2:
             raise ValueError("inspect = True: a decision of one environment only")
+        if self._options is not None and self.leader is not None:
+            led, skilled = self.leader.lead(self._options, observation, explore=explore)
+            if led is not observation:  # an option that begins changes what is predicted
+                if self.needs_prediction:
+                    led = led._replace(prediction=prediction_of(self._scenario))
+                observation = led
+            if skilled is not None:
+                self.decision_costs = {measure.name: 0.0 for measure in self.costs}
+                return Decision(skilled, ())
+            explore = False
         inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
         inboxes: list[Inbox] | None = None
         if inspect:
@@ -382,7 +415,10 @@ class Team:
         return total
 
     def learn(self, experience: Experience) -> None:
-        """Learn from a step."""
+        """Learn from a step. Below a leader, only the leader learns."""
+        if self._options is not None and self.leader is not None:
+            self.leader.learn(self._options, experience)
+            return
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)
 
@@ -400,7 +436,8 @@ class Team:
         ValueError
             If it cannot be used here; one line.
         """
-        for part, before in zip(self.parts, former.parts, strict=True):
+        # Only one of the teams may have a leader that learns, which is the last.
+        for part, before in zip(self._all, former._all, strict=False):
             part.warm_start(before)
 
     def save(self, path: Path | str) -> None:
@@ -421,11 +458,11 @@ class Team:
 
     def state_dict(self) -> StateDict:
         """Return the saved state of all parts as named arrays."""
-        if len(self.parts) == 1:
-            return self.parts[0].state_dict()
+        if len(self._all) == 1:
+            return self._all[0].state_dict()
         return {
             f"part{k}.{name}": array
-            for k, part in enumerate(self.parts)
+            for k, part in enumerate(self._all)
             for name, array in part.state_dict().items()
         }
 
@@ -437,10 +474,10 @@ class Team:
         ValueError
             If it is that of another team.
         """
-        if len(self.parts) == 1:
-            self.parts[0].load_state_dict(state)
+        if len(self._all) == 1:
+            self._all[0].load_state_dict(state)
             return
-        for k, part in enumerate(self.parts):
+        for k, part in enumerate(self._all):
             part.load_state_dict(select_prefix(f"part{k}.", state))
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..numerics import BoolArray, FloatArray, IntArray
 from .environments import Environments
+from .options import LeaderOptions
 from .prediction import Prediction
 from .scenario import Scenario, unwrapped
 
@@ -85,6 +86,14 @@ class MirrorSymmetric(Protocol):
         ValueError
             If an agent has no mirror image; one line.
         """
+
+
+@runtime_checkable
+class Led(Protocol):
+    """A leader decides above the agents, see `options_of`."""
+
+    options: LeaderOptions | None
+    """Options of the leader; None without a leader."""
 
 
 @runtime_checkable
@@ -170,6 +179,11 @@ def interactions_of(scenario: Scenario) -> Sequence[tuple[int, int]] | None:
     """Return the pairs of interacting agents, or None if the scenario declares none."""
     scenario = unwrapped(scenario)
     return scenario.interactions if isinstance(scenario, Interacting) else None
+
+
+def options_of(scenario: Scenario) -> LeaderOptions | None:
+    """Return the options of the leader above the agents, or None without a leader."""
+    return scenario.options if isinstance(scenario, Led) else None
 
 
 def partners_of(scenario: Scenario) -> Sequence[int] | None:

@@ -65,3 +65,5 @@ class Experience(NamedTuple):
     """Result of the step."""
     last: bool
     """Whether the episode ends: terminated, truncated, or out of steps."""
+    duration: int = 1
+    """Number of decision periods that the actions lasted; more than one for options only."""

@@ -73,6 +73,8 @@ class Earlier(NamedTuple):
     """``(m,)`` rewards."""
     follower: IntArray
     """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
+    durations: IntArray
+    """``(m,)`` number of decision periods between an after-state and the next."""
 
 
 class BatchTD(Learner):
@@ -95,11 +97,12 @@ class BatchTD(Learner):
         """The agents ``(k,)`` of every row."""
         self.theta: FloatArray = np.zeros((len(self.members), rules.n_rules), rules.dtype)
         d = len(rules.partitions)
-        nothing = Earlier(np.zeros((0, d)), np.zeros(0), np.zeros(0, dtype=np.int64))
+        nothing = Earlier(np.zeros((0, d)), np.zeros(0), *np.zeros((2, 0), dtype=np.int64))
         self._earlier = [nothing] * len(self.members)
         self._states: list[FloatArray] = []
         self._rewards: list[FloatArray] = []
         self._follower: list[int] = []
+        self._durations: list[int] = []
         self._episode_start = 0  # index of the first after-state of the episode
         # By row, active rules and strengths of the after-states in the last regression.
         self._active: list[tuple[IntArray, FloatArray]] = []
@@ -112,8 +115,15 @@ class BatchTD(Learner):
         self._cut_off()
         self._episode_start = len(self._states)
 
-    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
+    def observe(
+        self,
+        states: FloatArray,
+        reward: float | FloatArray,
+        terminated: bool,
+        duration: int = 1,
+    ) -> int:
         """Store an after-state; regress after every `interval` decisions."""
+        self._durations.append(duration)
         self._states.append(states.copy())
         self._rewards.append(np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)))
         self._follower.append(TERMINAL if terminated else len(self._states))
@@ -135,12 +145,12 @@ class BatchTD(Learner):
         s = self.settings
         outcomes = self._outcomes()
         for row, (taken, strengths) in enumerate(self._active):
-            rewards, follower = outcomes[row]
+            rewards, follower, durations = outcomes[row]
             rewards = REWARD_SCALE * rewards
             weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
-            paid = rewards, follower, weights
+            paid = rewards, follower, s.discount**durations, weights
             constants = s.discount, s.trace_decay, low, high
             for _ in range(s.regression_iterations):
                 theta = solve(aim(values_of(theta), paid, constants, taken, strengths, theta.size))
@@ -183,8 +193,8 @@ class BatchTD(Learner):
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         return self.rules.active(states)
 
-    def _outcomes(self) -> list[tuple[FloatArray, IntArray]]:
-        """Return rewards and successors of all after-states by row, earlier ones first.
+    def _outcomes(self) -> list[tuple[FloatArray, IntArray, IntArray]]:
+        """Return rewards, successors and durations of all after-states by row, earlier ones first.
 
         With k agents, after-state ``s * k + j`` is that of agent j after step s.
         """
@@ -196,7 +206,8 @@ class BatchTD(Learner):
             k, before = len(members), len(earlier.states)
             follower = np.where(steps < 0, steps, before + steps * k + np.arange(k)).ravel()
             rewards = np.append(earlier.rewards, paid[:, members].ravel())
-            outcomes.append((rewards, np.append(earlier.follower, follower)))
+            durations = np.append(earlier.durations, np.repeat(self._durations, k))
+            outcomes.append((rewards, np.append(earlier.follower, follower), durations))
         return outcomes
 
     def states_of(self, row: int, since: int = 0) -> FloatArray:
@@ -215,10 +226,12 @@ class BatchTD(Learner):
             "states": np.array(self._states).reshape(-1, n, d),
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
+            "durations": np.array(self._durations, dtype=np.int64),
             "earlier_rows": np.repeat(np.arange(len(held)), held),
             "earlier_states": np.concatenate([e.states for e in self._earlier]),
             "earlier_rewards": np.concatenate([e.rewards for e in self._earlier]),
             "earlier_follower": np.concatenate([e.follower for e in self._earlier]),
+            "earlier_durations": np.concatenate([e.durations for e in self._earlier]),
         }
 
     def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
@@ -227,6 +240,7 @@ class BatchTD(Learner):
         self._states = list(state["states"])
         self._rewards = list(state["rewards"])
         self._follower = [int(f) for f in state["follower"]]
+        self._durations = [int(k) for k in state["durations"]]
         ended = [s for s, f in enumerate(self._follower) if f in (TERMINAL, CUT_OFF)]
         self._episode_start = ended[-1] + 1 if ended else 0
         rows = state["earlier_rows"]
@@ -274,7 +288,7 @@ def row_values(theta: FloatArray, active: IntArray, strengths: FloatArray) -> Fl
 @njit(cache=True)
 def aim(
     values: FloatArray,
-    outcomes: tuple[FloatArray, IntArray, FloatArray],
+    outcomes: tuple[FloatArray, IntArray, FloatArray, FloatArray],
     constants: tuple[float, float, float, float],
     active: IntArray,
     strengths: FloatArray,
@@ -287,7 +301,7 @@ def aim(
     values
         ``(N,)`` f of all rows.
     outcomes
-        Rewards, next rows and weights of all rows, ``(N,)`` each.
+        Rewards, next rows, discounts of what follows, and weights of all rows, ``(N,)`` each.
     constants
         Discount, trace decay, and the range that targets are clipped to.
     active, strengths
@@ -295,9 +309,9 @@ def aim(
     n_rules
         Number of rules.
     """
-    rewards, follower, weights = outcomes
+    rewards, follower, discounts, weights = outcomes
     discount, decay, low, high = constants
-    returns = lambda_returns(values, rewards, follower, discount, decay)
+    returns = lambda_returns(values, rewards, follower, discounts, discount, decay)
     moment = np.zeros(n_rules)
     for s in range(len(active)):
         target = returns[s]
@@ -313,11 +327,16 @@ def aim(
 
 @njit(cache=True)
 def lambda_returns(
-    values: FloatArray, rewards: FloatArray, follower: IntArray, discount: float, decay: float
+    values: FloatArray,
+    rewards: FloatArray,
+    follower: IntArray,
+    discounts: FloatArray,
+    discount: float,
+    decay: float,
 ) -> FloatArray:
     """Return the lambda-return of every row, by recursion from the end of each episode.
 
-    ``G(s) = R(s) + gamma ((1 - lambda) f(s') + lambda G(s'))``
+    ``G(s) = R(s) + gamma^k ((1 - lambda) f(s') + lambda G(s'))``, where `discounts` are gamma^k.
     """
     returns = np.empty(len(values))
     for s in range(len(values) - 1, -1, -1):
@@ -328,5 +347,5 @@ def lambda_returns(
         else:
             after = follower[s]
             ahead = (1.0 - decay) * values[after] + decay * returns[after]
-            returns[s] = rewards[s] + discount * ahead
+            returns[s] = rewards[s] + discounts[s] * ahead
     return returns

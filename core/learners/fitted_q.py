@@ -151,9 +151,11 @@ class FittedQ(BatchTD, Evaluator):
         states: FloatArray,
         reward: float | FloatArray,
         terminated: bool,
+        duration: int = 1,
     ) -> int:
         """Store a decision with its outcome; regress if an update is due."""
-        return self.observe(np.column_stack([left, joint_action]), reward, terminated)
+        known = np.column_stack([left, joint_action])
+        return self.observe(known, reward, terminated, duration)
 
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the active rules of decisions, by the action that was taken, and strengths."""

@@ -75,6 +75,7 @@ class Learner(ABC):
         states: FloatArray,
         reward: float | FloatArray,
         terminated: bool,
+        duration: int = 1,
     ) -> int:
         """Learn from a decision and its outcome. Learners of state values use the outcome only.
 
@@ -87,6 +88,8 @@ class Learner(ABC):
             ``(n,)`` actions taken.
         states, reward, terminated
             As of `observe`.
+        duration
+            Number of decision periods that the actions lasted. What follows is discounted as often.
         """
         return self.observe(states, reward, terminated)
 

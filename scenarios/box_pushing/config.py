@@ -5,7 +5,9 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ...core.plugins.settings import Positive, ScenarioSettings, team_size
+from ...core.learners.fitted_q import FittedQSettings
+from ...core.plugins.settings import Positive, ScenarioSettings, Settings, team_size
+from ...core.search.exploration import BurstExploration
 from ..state_variables import names_of
 from .prediction.settings import BeliefSettings
 from .states.variables import STATE_VARIABLES
@@ -19,6 +21,26 @@ from .world.settings import (
     RobotSettings,
     label,
 )
+
+
+class LeaderSettings(Settings):
+    """Leader above all robots, which decides between a straight push and a second side."""
+
+    policy: Literal["none", "rule", "learned"] = "none"
+    """Policy of the leader: there is ``none``, it pushes from a second side if the goal is more
+    than 20 degrees off (``rule``), or it is ``learned`` while all other agents keep their
+    weights."""
+    learner: FittedQSettings = FittedQSettings(
+        discount=0.995,
+        regression_iterations=60,
+        exploration=BurstExploration(rate=0.5, decay=0.97, floor=0.05, length=1.0),
+    )
+    """Learner of the leader, see `learner` with `kind` fitted-q."""
+    limit: Annotated[int, Field(ge=1)] = 300
+    """Number of decisions after which an option ends."""
+    quorum: Annotated[float, Field(gt=0, le=1)] = 0.6
+    """Fraction of the robots that must stand at the second side before they push."""
+
 
 WRITTEN = {
     "box_distance": -1.0,
@@ -84,7 +106,7 @@ class BoxPushingSettings(BoxTaskSettings):
     """The box-pushing scenario (Section IX)."""
 
     kind: Literal["box-pushing"] = "box-pushing"
-    factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
+    factory: ClassVar[str] = f"{__package__}.leading:built"
     state_space: Annotated[
         Literal["paper", "paper-box", "relational", "pose", "crowd", "wide"] | tuple[str, ...],
         names_of(STATE_VARIABLES),
@@ -101,6 +123,9 @@ class BoxPushingSettings(BoxTaskSettings):
     prediction_horizon: Periods = 24
     """Control periods that predictions look ahead, the decision being held for all of them: so far
     that what agents do shows."""
+
+    leader: LeaderSettings = LeaderSettings()
+    """Leader above all robots."""
 
     @model_validator(mode="after")
     def _believes(self) -> Self:

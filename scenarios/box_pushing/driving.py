@@ -8,18 +8,16 @@ robots within reach count.
 
 from __future__ import annotations
 
-from itertools import product
 from math import log, pi
 
 import numpy as np
 
-from ...core.numerics import BoolArray, FloatArray, IntArray, wrap
+from ...core.numerics import BoolArray, FloatArray, wrap
 from .prediction.predictors import push_model
 from .scenario import BoxPushing
 from .world.boxes import BoxSpec
 from .world.geometry import distances
-from .world.robots import nominal_effect
-from .world.settings import RobotSettings
+from .world.robots import nominal_effect, side_actions
 
 CLEARANCE = 0.006
 """Least gap [m] to box and other robots on the way to a slot."""
@@ -54,7 +52,7 @@ class Drivers:
         self.model = push_model("push", list(scenario.world.robots), self.box)
         self.increment = scenario.settings.speed_increment
         self.seconds = scenario.settings.period
-        self.choices = _robot_actions(self.robot, len(self.actions))
+        self.choices = side_actions(self.robot, len(self.actions))
         self.wheels = [slice(group[0], group[-1] + 1) for group in scenario.groups]
         self._effect = nominal_effect(self.robot)
 
@@ -122,14 +120,6 @@ def _distinct(speeds: FloatArray) -> BoolArray:
     same = (by_wheel[..., None] == by_wheel[:, :, None]).all(axis=0)
     first: BoolArray = same.argmax(axis=2) == np.arange(speeds.shape[1])
     return first
-
-
-def _robot_actions(robot: RobotSettings, n_actions: int) -> IntArray:
-    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
-    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
-    groups = sorted(set(sides))
-    rows = product(range(n_actions), repeat=len(groups))
-    return np.array([[row[groups.index(side)] for side in sides] for row in rows])
 
 
 def move(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from ...core.interface.measures import SUCCESS, Measure
 
+OPTIONS = Measure("options", "options of the leader", "1", gathering="last", least=0.0)
+"""Number of options that the leader began, each with a message to every agent below."""
 MEASURES = (
     SUCCESS,
     Measure(

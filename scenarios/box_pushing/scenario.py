@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ...core.interface.environments import Transitions
+from ...core.interface.measures import Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario, Transition
@@ -71,12 +72,19 @@ class BoxPushing(Scenario):
     (4, 8)
     """
 
-    measures = MEASURES
+    measures: tuple[Measure, ...] = MEASURES
+    has_leader: ClassVar[bool] = False
+    """Whether there is a leader above the agents, see `leading`."""
     regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
     recorded: tuple[str, ...] = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
         expect("settings of box pushing", BoxPushingSettings, settings=settings)
+        if settings.leader.policy != "none" and not self.has_leader:
+            raise ValueError(
+                f"scenario.leader.policy = {settings.leader.policy!r}: a leader is part of a team; "
+                "build the scenario by settings.build(), or leave out leader"
+            )
         self.settings = settings
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
@@ -158,15 +166,21 @@ class BoxPushing(Scenario):
         self._sensing = stream_of(seed, SENSING)
         rng = np.random.default_rng(seed)
         start = self.settings.start
-        robots, box, self._goal = place(start, rng, self.world.robots, self.box, self._unit)
+        robots, box, self.goal = place(start, rng, self.world.robots, self.box, self._unit)
+        self.aim = self.goal
         self.world.place(robots, box)
-        self._speeds: FloatArray = np.zeros(len(self.agents))
+        self.commanded_speeds: FloatArray = np.zeros(len(self.agents))
+        """Commanded speeds ``(n,)`` of all wheels [m/s]."""
         self._step = 0
         self._failures.begin(seed, episode)
         self.world.set_grip(self._failures.grip)
         self._save()
+        return self.states_at_rest()
+
+    def states_at_rest(self) -> FloatArray:
+        """Return the states ``(n, d)`` of all agents if the box has not moved."""
         present = self._present(self.world.box_pose)
-        return self.states_at(present, self._speeds[None])[0]
+        return self.states_at(present, self.commanded_speeds[None])[0]
 
     def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
         """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""
@@ -174,17 +188,17 @@ class BoxPushing(Scenario):
 
     def step(self, joint_action: IntArray) -> Transition:
         """Command the wheels, simulate one decision period, observe and reward."""
-        self._speeds = self.commanded(self._speeds, joint_action)
+        self.commanded_speeds = self.commanded(self.commanded_speeds, joint_action)
         before = self.world.poses
         begin = working_seconds()
-        self._advance(self._speeds)
+        self._advance(self.commanded_speeds)
         moved = working_seconds()
         present = self._present(before[0])
-        states = self.states_at(present, self._speeds[None])[0]
+        states = self.states_at(present, self.commanded_speeds[None])[0]
         readings = self.world.infrared()
         if self._is_noisy:
             readings = self.settings.infrared.noisy(readings, self._sensing)
-        distance, approach, turn = progress_of(present)
+        distance, approach, turn = progress_of(present._replace(goal=self.goal))
         contact = self.world.contact[None]
         strongest = np.maximum.reduce(readings, axis=1)[None]
         gained = reward(self.task, distance, approach, turn, contact, strongest)[0]
@@ -197,7 +211,7 @@ class BoxPushing(Scenario):
         if terminated:
             # The wheels stop; the box may leave the tolerance before it comes to rest.
             self._advance(np.zeros(len(self.agents)))
-            there = self.task.reached(self._distance(), self._orientation())
+            there = self.task.reached(self.distance, self._orientation())
             measured["stopped_at_goal"] = bool(there)
         self._step += 1
         self._save()
@@ -218,8 +232,8 @@ class BoxPushing(Scenario):
         situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
-            self._goal,
-            self._speeds,
+            self.aim,
+            self.commanded_speeds,
             self.nominal_effects,
         )
         if self._playground is None or self._saved is None:
@@ -237,7 +251,7 @@ class BoxPushing(Scenario):
 
     def constants_of_episode(self) -> dict[str, object]:
         """Return the goal pose of the episode and the constants of drawing."""
-        return {"goal_pose": self._goal, **self.settings.drawing}
+        return {"goal_pose": self.goal, **self.settings.drawing}
 
     def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
         """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
@@ -280,15 +294,15 @@ class BoxPushing(Scenario):
         `stopped_at_goal` is known after the step that ends the episode: whether the box stayed at
         the goal once the wheels had stopped.
         """
-        return self._measured(self._distance(), self._orientation())
+        return self._measured(self.distance, self._orientation())
 
     def _measured(self, distance: float, orientation: float) -> dict[str, object]:
         times = self.world.contact_time
         return {
             "robot_poses": self.world.robot_poses.copy(),
             "box_pose": self.world.box_pose.copy(),
-            "goal_pose": self._goal,
-            "wheel_speeds": self._speeds,
+            "goal_pose": self.goal,
+            "wheel_speeds": self.commanded_speeds,
             "contact": self.world.contact.copy(),
             "contact_time": times.copy(),
             "contact_fraction": float(np.add.reduce(times) / len(times)),
@@ -303,11 +317,13 @@ class BoxPushing(Scenario):
         """Simulate one decision period with the given wheel speeds."""
         self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
-    def _distance(self) -> float:
-        return float(np.hypot(*(self._goal - self.world.box_pose)[:2]))
+    @property
+    def distance(self) -> float:
+        """Distance of the box from the goal [m]."""
+        return float(np.hypot(*(self.goal - self.world.box_pose)[:2]))
 
     def _orientation(self) -> float:
-        return float(wrap(self.world.box_pose[2] - self._goal[2]))
+        return float(wrap(self.world.box_pose[2] - self.goal[2]))
 
     def _present(self, origin: FloatArray) -> SituationBatch:
         """Return the present situation; `origin` is the former pose ``(3,)`` of the box."""
@@ -329,7 +345,7 @@ class BoxPushing(Scenario):
         """
         last = np.ascontiguousarray(poses.transpose(1, 2, 0))
         apart, before = np.ascontiguousarray(gaps.T), np.ascontiguousarray(origins.T)
-        return SituationBatch(last[1:], last[0], apart, self._goal, before, 1.0, self.box.shape)
+        return SituationBatch(last[1:], last[0], apart, self.aim, before, 1.0, self.box.shape)
 
     def states_at(self, batch: SituationBatch, speeds: FloatArray) -> FloatArray:
         """Return the states ``(m, n, d)`` of all agents in m situations.
@@ -345,7 +361,7 @@ class BoxPushing(Scenario):
             poses = poses[:, self.body]
             boxes = np.repeat(boxes, len(self.agents), axis=0)
         states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
-        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), boxes, self._goal)
+        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), boxes, self.aim)
         states[..., :n_own] = own.reshape(*states.shape[:3], -1)
         states[..., n_own:] = shared[:, :, None]
         return states.reshape(*speeds.shape, -1)

@@ -225,8 +225,8 @@ class SummaryTable:
     def remark(self) -> str:
         """Remark on the intervals."""
         if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return "Intervals: Wilson's for rates, else bootstrap (too short for skewed values)."
-        return f"Fewer than {FEW} seeds: Wilson's intervals for rates, else Student's intervals."
+            return "Rates have Wilson intervals, others bootstrap intervals (too short if skewed)."
+        return f"Fewer than {FEW} seeds: rates have Wilson intervals, others Student intervals."
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:

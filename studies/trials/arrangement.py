@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.agents.loop import policy_seed
 from ...core.agents.team import Team
+from ...core.interface.abilities import options_of
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import Scenario, checked_scenario, has_same_agents
 from ...core.plugins.sources import format_error, place
@@ -52,6 +53,9 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     """
     world = checked_scenario(settings.scenario.build())
     scenario, hierarchy = settings.arrange(world)
+    if options_of(world) is not None and scenario is not world:
+        key = "scenario.perception" if settings.scenario.perception else "agents"
+        raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
     failures = settings.topology.failures
     team = Team(settings.learner, scenario, hierarchy, policy_seed(seed), failures)
     return Arrangement(world, scenario, team)
@@ -88,8 +92,8 @@ def transfer(
 ) -> Iterator[tuple[str, Arrangement]]:
     """Yield the name and the arrangement of each further evaluation, in which no team learns.
 
-    The team is that of `own` if the same agents decide in the same way. Otherwise it is a new team
-    with the weights of `own`.
+    The team is that of `own` if the same agents decide in the same way, without a leader. Otherwise
+    it is a new team with the weights of `own`.
 
     Raises
     ------
@@ -99,7 +103,9 @@ def transfer(
     for name, other in evaluations:
         with _naming(f"evaluations.{name}"):
             there = arrange(other, seed)
-            if other.acts_as(settings) and has_same_agents(there.scenario, own.scenario):
+            has_leader = there.team.leader is not None or own.team.leader is not None
+            is_alike = other.acts_as(settings) and has_same_agents(there.scenario, own.scenario)
+            if is_alike and not has_leader:
                 there = there._replace(team=own.team)
             else:
                 there.team.warm_start(own.team)

@@ -62,7 +62,7 @@ def test_learners_that_need_predictions_are_refused_before_any_trial(
     out = ["--out", "results"] if command == "run" else []
     assert main([command, str(spec), *out]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "learner.kind = 'batch-td': decides by predicted states" in line
+    assert "learner.kind = 'batch-td': needs predicted states" in line
     assert "the scenario Mute has no method predict" in line
     assert "ppo" in line
     assert "learner.decision.rule = 'random'" in line

@@ -29,6 +29,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
+from itertools import product
 from math import radians
 from pathlib import Path
 from typing import NamedTuple
@@ -260,3 +261,11 @@ def sensor_directions(robots: Sequence[RobotSettings]) -> FloatArray:
     if len(counts) != 1:
         raise ValueError(f"robots: {sorted(counts)} sensors, must be the same number on each")
     return np.array(sensors)
+
+
+def side_actions(robot: RobotSettings, n_actions: int) -> IntArray:
+    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
+    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
+    groups = sorted(set(sides))
+    rows = product(range(n_actions), repeat=len(groups))
+    return np.array([[row[groups.index(side)] for side in sides] for row in rows])

@@ -22,7 +22,7 @@ ACROSS = np.array([1.0, -1.0, -1.0])
 
 def states(scenario, origin):
     """Return the present states of all agents; the box was at `origin` a period before."""
-    return scenario.states_at(scenario._present(origin), scenario._speeds[None])[0]
+    return scenario.states_at(scenario._present(origin), scenario.commanded_speeds[None])[0]
 
 
 @pytest.mark.parametrize("state_space", ["paper", "relational", "pose", "crowd", "wide"])
@@ -34,13 +34,13 @@ def test_the_image_of_a_state_is_the_state_of_the_mirrored_world(
     mirror = Mirror.of(scenario)
     scenario.reset(1)
     poses, box = scenario.world.robot_poses.copy(), scenario.world.box_pose.copy()
-    scenario._speeds = np.linspace(-0.13, 0.13, len(scenario.agents))
+    scenario.commanded_speeds = np.linspace(-0.13, 0.13, len(scenario.agents))
     origin = box + np.array([-0.03, 0.01, 0.05])
     seen = states(scenario, origin)
 
     scenario.world.place(poses * ACROSS, box * ACROSS)
-    scenario._goal = scenario._goal * ACROSS
-    scenario._speeds = scenario._speeds[mirror.partners]
+    scenario.goal = scenario.aim = scenario.goal * ACROSS
+    scenario.commanded_speeds = scenario.commanded_speeds[mirror.partners]
     found = states(scenario, origin * ACROSS)[mirror.partners]
     off = found - mirror.states(seen)[len(seen) :]
     is_angle = [variable.periodic for variable in scenario.state_space.variables]

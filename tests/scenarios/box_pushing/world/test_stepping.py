@@ -47,7 +47,7 @@ def played(settings: BoxPushingSettings, episodes: int = 2, steps: int = 40) -> 
             actions = rng.integers(len(scenario.action_set), size=len(scenario.agents))
             if step % 20 > 12:  # Box2D lets bodies sleep after half a second
                 actions[:] = scenario.action_set.neutral
-                scenario._speeds[:] = 0.0
+                scenario.commanded_speeds[:] = 0.0
             transition = scenario.step(actions)
             whole = [transition.states, transition.reward, scenario.world.contact_time]
             whole += [scenario.world.twists, scenario.world._wrenches, scenario.world.gaps]

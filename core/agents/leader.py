@@ -1,0 +1,137 @@
+"""Leader of a team, whose actions are options (Sutton, Precup and Singh 1999).
+
+A decision of a leader and what follows until its option ends is one step of a semi-Markov decision
+process. If the option lasts k decisions with rewards r_1 to r_k, the leader learns from::
+
+    Q(x, option) = r_1 + gamma r_2 + ... + gamma^(k-1) r_k + gamma^k max Q(x', other)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..hierarchy.hierarchy import Hierarchy
+from ..hierarchy.stages import Inbox
+from ..interface.agents import AgentContext
+from ..interface.experience import Decision, Experience, Observation
+from ..interface.options import LeaderOptions
+from ..interface.scenario import Scenario, Transition
+from ..learners.fitted_q import FittedQSettings
+from ..numerics import FloatArray, IntArray
+from .fuzzy import FuzzyAgents
+from .views import FuzzyInputs
+
+NO_MESSAGES = np.zeros(0, np.int64)
+INBOX = Inbox(np.zeros(1, np.int64), NO_MESSAGES, NO_MESSAGES, NO_MESSAGES)
+"""A leader has no superior that sends it messages."""
+
+
+class LeaderView(Scenario):
+    """Spaces of a leader, for which a learner is built. `Leader` makes its steps."""
+
+    agents = ("leader",)
+
+    def __init__(self, options: LeaderOptions) -> None:
+        self.state_space = options.state_space
+        self.action_set = options.action_set
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Refuse; the scenario below starts episodes."""
+        raise NotImplementedError("the scenario below starts episodes")
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Refuse; the agents below carry out options."""
+        raise NotImplementedError("the agents below carry out options")
+
+
+class Leader:
+    """Leader of a team.
+
+    Parameters
+    ----------
+    options
+        Options of the scenario in which the leader is built.
+    seed
+        Seed of the leader's random numbers.
+
+    Attributes
+    ----------
+    agents
+        The agent that decides and learns; empty for a leader by rule.
+    """
+
+    def __init__(self, options: LeaderOptions, seed: np.random.SeedSequence) -> None:
+        self.agents: tuple[FuzzyAgents, ...] = ()
+        self._view = LeaderView(options)
+        if options.learner is not None:
+            assert isinstance(options.learner, FittedQSettings)
+            hierarchy = Hierarchy(self._view.agents, [])
+            context = AgentContext(self._view, hierarchy, np.arange(1), seed)
+            self.agents = (FuzzyAgents(options.learner, context),)
+        self.reset()
+
+    def reset(self) -> None:
+        """Start an episode."""
+        self._decided: tuple[Observation, IntArray, FuzzyInputs] | None = None
+        self._duration = 0
+        self._return = 0.0
+
+    def lead(
+        self, options: LeaderOptions, observation: Observation, *, explore: bool
+    ) -> tuple[Observation, IntArray | None]:
+        """Decide on an option if none goes on.
+
+        Returns
+        -------
+        Observation
+            Observation of the agents below.
+        IntArray or None
+            Their actions ``(n,)``, if a given skill acts for them.
+        """
+        goes_on = 0 < self._duration < options.limit and options.advance()
+        if not goes_on:
+            states = options.begin(self._decide(options, explore=explore))
+            observation = observation._replace(states=states)
+            self._duration = 0
+        self._duration += 1
+        return observation, options.joint_action()
+
+    def _decide(self, options: LeaderOptions, *, explore: bool) -> int:
+        """Return an option; a leader that learns has first learned from the last one."""
+        if not self.agents:
+            return options.rule()
+        (agent,) = self.agents
+        observation = Observation(options.observe()[None])
+        if self._decided is not None and explore:
+            self._learn(observation.states, terminated=False, last=False)
+        inputs = agent.observe(observation, explore=explore)
+        action = agent.act(inputs, INBOX)
+        agent.conclude(inputs, action)
+        self._decided = observation, action, inputs
+        return int(action[0])
+
+    def learn(self, options: LeaderOptions, experience: Experience) -> None:
+        """Add the mean reward of a step below, and learn if the episode ends with it.
+
+        A lost task is terminal to the leader. A terminal reward repeats forever if the state does.
+        """
+        if not self.agents:
+            return
+        transition = experience.transition
+        discount = self.agents[0].settings.discount
+        reward = float(np.mean(transition.reward))
+        if transition.terminated and transition.absorbing:
+            reward /= 1.0 - discount
+        self._return += discount ** (self._duration - 1) * reward
+        if experience.last:
+            is_terminal = transition.terminated or transition.truncated
+            self._learn(options.observe()[None], terminated=is_terminal, last=True)
+
+    def _learn(self, states: FloatArray, *, terminated: bool, last: bool) -> None:
+        """Learn from an option that has ended in some states ``(1, d)`` of the leader."""
+        assert self._decided is not None
+        before, action, inputs = self._decided
+        result = Transition(states, self._return, terminated, False, {}, absorbing=False)
+        decision = Decision(action, (inputs,))
+        self.agents[0].learn(Experience(before, decision, result, last, self._duration), inputs)
+        self._return = 0.0

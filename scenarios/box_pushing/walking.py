@@ -1,0 +1,328 @@
+"""Robots that walk around a box to another of its sides, a given skill.
+
+They walk along a curve at a small distance around the box and keep their order. A robot searches
+over sequences of `DEPTH` of its own actions. The robot at the front searches first; the robots
+behind know its plan.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import atan2, cos, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+from shapely.geometry.polygon import orient
+
+from ...core.numerics import FloatArray, IntArray, njit, wrap, wrap_one
+from ..angles import angle_of, rotate
+from .scenario import BoxPushing
+from .world.boxes import BoxSpec
+from .world.robots import nominal_effect, side_actions
+
+Pose = tuple[float, float, float]
+"""Position [m, m] and heading [rad], or other three numbers of a robot."""
+GAP_M = 0.04
+"""Distance of walking robots from the box [m]."""
+CLEARANCE_M = 0.012
+"""Smallest distance that walking robots keep from each other and from the box [m]."""
+DEPTH = 3
+"""Number of decisions that a robot looks ahead."""
+ARRIVAL_M = 0.1
+"""Way to its place over which a robot turns from its course to the box [m]."""
+STANDING = 0.1, 0.03, 0.6
+"""Largest way [m], distance from the curve [m] and angle [rad] of a robot that stands."""
+
+
+class HullSide(NamedTuple):
+    """A side of the convex hull of a box, in the frame of the box."""
+
+    direction: float
+    """Direction straight into the side [rad]."""
+    middle: tuple[float, float]
+    """Middle of the side [m]."""
+    half: float
+    """Half its length [m]."""
+
+
+class Path(NamedTuple):
+    """Closed curve around a box, counterclockwise, in its frame."""
+
+    points: FloatArray
+    """``(P + 1, 2)`` corners [m]; the last is the first."""
+    ways: FloatArray
+    """``(P + 1,)`` distances from the first corner along the curve [m]."""
+
+
+class Wheels(NamedTuple):
+    """Commands that a robot's wheels may receive, see `ActionSet.apply`."""
+
+    gains: FloatArray
+    """``(k, w)`` factors on wheel speeds, by robot action."""
+    increments: FloatArray
+    """``(k, w)`` increments [m/s]."""
+    limit: float
+    """Maximum speed [m/s]."""
+    effect: FloatArray
+    """``(3, w + 1)`` twist in the robot's frame = effect @ [wheel speeds, 1]."""
+    period: float
+    """Decision period [s]."""
+    radius: float
+    """Radius of the robot [m]."""
+
+
+def sides_of(box: BoxSpec) -> list[HullSide]:
+    """Return the sides of the convex hull of a box, counterclockwise.
+
+    Raises
+    ------
+    ValueError
+        If the box has no sides.
+    """
+    if box.polygon is None:
+        raise ValueError(f"scenario.leader: box {box.name!r} has no sides, use a polygon")
+    corners = np.array(orient(box.polygon.convex_hull).exterior.coords)
+    sides = []
+    for a, b in pairwise(corners):
+        along = b - a
+        middle = (a + b) / 2
+        direction = atan2(along[0], -along[1])
+        sides.append(HullSide(direction, (middle[0], middle[1]), hypot(*along) / 2))
+    return sides
+
+
+def path_around(box: BoxSpec, margin: float) -> Path:
+    """Return the curve at a distance [m] from the convex hull of a box."""
+    assert box.polygon is not None
+    around = orient(box.polygon.convex_hull.buffer(margin, quad_segs=4))
+    points = np.ascontiguousarray(around.exterior.coords)
+    ways = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    return Path(points, ways)
+
+
+def poses_in_box(scenario: BoxPushing) -> FloatArray:
+    """Return the poses ``(M, 3)`` of all robots in the frame of the box."""
+    box = scenario.world.box_pose
+    robots = scenario.world.robot_poses
+    x, y = rotate(cos(box[2]), -sin(box[2]), *(robots[:, :2] - box[:2]).T)
+    return np.column_stack([x, y, wrap(robots[:, 2] - box[2])])
+
+
+class Walk:
+    """Robots on their way around a box.
+
+    Parameters
+    ----------
+    scenario
+        Robots and box.
+    side, destination
+        The side that the robots leave, and the side to which they walk.
+    """
+
+    def __init__(self, scenario: BoxPushing, side: HullSide, destination: HullSide) -> None:
+        self._scenario = scenario
+        robot = scenario.robot
+        actions = scenario.action_set
+        unit = scenario.settings.speed_increment * robot.max_speed
+        self._choices = side_actions(robot, len(actions))
+        self._wheels = Wheels(
+            np.array(actions.gains)[self._choices],
+            unit * np.array(actions.increments)[self._choices],
+            robot.max_speed,
+            nominal_effect(robot),
+            scenario.settings.period,
+            robot.radius,
+        )
+        self._path = path_around(scenario.box, robot.radius + GAP_M)
+        self._middle = locate(self._path, *destination.middle)[0]
+        n_robots = len(scenario.groups)
+        room = destination.half - robot.radius - 0.01
+        self._spread = np.linspace(room, -room, n_robots) if n_robots > 1 else np.zeros(1)
+        self._sense = float(np.sign(wrap_one(destination.direction - side.direction)))
+        self._places = np.zeros((n_robots, 3))
+        self._places[:, 1:] = destination.direction, self._sense
+
+    def joint_action(self) -> IntArray:
+        """Return the actions ``(n,)`` of all wheels; the robot ahead has the farthest place."""
+        poses = poses_in_box(self._scenario)
+        length = self._path.ways[-1]
+        ways = np.array([locate(self._path, x, y)[0] for x, y, _ in poses])
+        left = np.mod(self._sense * (self._middle - ways) + 0.25 * length, length)
+        order: IntArray = np.argsort(left)
+        self._places[order, 0] = np.mod(self._middle + self._sense * self._spread, length)
+        speeds = self._scenario.commanded_speeds.reshape(len(poses), -1)
+        actions = walk(order, poses, speeds, self._places, self._path, self._wheels)
+        return self._choices[actions].ravel()
+
+    def fraction_standing(self) -> float:
+        """Return the fraction of the robots that stand at their places and face the box."""
+        return standing(poses_in_box(self._scenario), self._places, self._path)
+
+
+@njit(cache=True)
+def locate(path: Path, x: float, y: float) -> Pose:
+    """Return way along the curve, signed distance from it, and its direction at a point.
+
+    Ways and distances are in m, the direction in rad. Distances towards the box are positive.
+    """
+    nearest = np.inf
+    way = course = side = 0.0
+    points = path.points
+    for i in range(len(points) - 1):
+        dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        length = path.ways[i + 1] - path.ways[i]
+        along = ((x - points[i, 0]) * dx + (y - points[i, 1]) * dy) / length
+        along = min(max(along, 0.0), length)
+        off_x = x - points[i, 0] - along * dx / length
+        off_y = y - points[i, 1] - along * dy / length
+        square = off_x * off_x + off_y * off_y
+        if square < nearest:
+            nearest = square
+            side = dx * off_y - dy * off_x
+            way = path.ways[i] + along
+            course = angle_of(dx, dy)
+    return way, np.copysign(np.sqrt(nearest), side), course
+
+
+@njit(cache=True)
+def errors_of(path: Path, pose: Pose, place: Pose) -> Pose:
+    """Return the way to a place [m], the signed distance from the curve [m], and the angle [rad].
+
+    Parameters
+    ----------
+    path
+        The curve.
+    pose
+        Pose of a robot in the frame of the box.
+    place
+        Way of the place along the curve [m], heading there [rad], and 1 or -1: counterclockwise
+        or clockwise.
+    """
+    way, off, course = locate(path, pose[0], pose[1])
+    goal, heading, sense = place
+    total = path.ways[-1]
+    left = sense * (goal - way)
+    left -= total * np.floor(left / total + 0.25)  # a robot may overshoot by a quarter turn
+    if left > ARRIVAL_M:
+        heading = course if sense > 0.0 else course + np.pi
+    elif left < -ARRIVAL_M:
+        heading = course if sense < 0.0 else course + np.pi
+    return abs(left), off, abs(wrap_one(pose[2] - heading))
+
+
+@njit(cache=True)
+def _cost(path: Path, pose: Pose, place: Pose) -> float:
+    left, off, turn = errors_of(path, pose, place)
+    too_near = max(off - (GAP_M - CLEARANCE_M), 0.0)
+    return left + 2.0 * abs(off) + 20.0 * too_near + 0.06 * turn
+
+
+@njit(cache=True)
+def _moved(wheels: Wheels, pose: Pose, speeds: FloatArray, action: int, out: FloatArray) -> Pose:
+    """Return the pose after a decision period, and write the wheel speeds to `out`."""
+    ahead, left, turn = wheels.effect[0, -1], wheels.effect[1, -1], wheels.effect[2, -1]
+    for w in range(len(speeds)):
+        wanted = wheels.gains[action, w] * speeds[w] + wheels.increments[action, w]
+        out[w] = min(max(wanted, -wheels.limit), wheels.limit)
+        ahead += wheels.effect[0, w] * out[w]
+        left += wheels.effect[1, w] * out[w]
+        turn += wheels.effect[2, w] * out[w]
+    half = 0.5 * turn * wheels.period
+    chord = wheels.period * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    middle = pose[2] + half
+    dx, dy = rotate(np.cos(middle), np.sin(middle), chord * ahead, chord * left)
+    return pose[0] + dx, pose[1] + dy, pose[2] + 2.0 * half
+
+
+@njit(cache=True)
+def _crowding(x: float, y: float, others: FloatArray, near: IntArray, span: float) -> float:
+    """Return by how much a robot comes too close to others, in all [m]."""
+    total = 0.0
+    for k in near:
+        dx, dy = x - others[k, 0], y - others[k, 1]
+        square = dx * dx + dy * dy
+        if square < span * span:
+            total += span - np.sqrt(square)
+    return total
+
+
+@njit(cache=True)
+def walk(
+    order: IntArray,
+    poses: FloatArray,
+    speeds: FloatArray,
+    places: FloatArray,
+    path: Path,
+    wheels: Wheels,
+) -> IntArray:
+    """Return the robot actions ``(M,)`` with which robots walk to their places.
+
+    Parameters
+    ----------
+    order
+        ``(M,)`` robots, the one at the front first.
+    poses
+        ``(M, 3)`` poses in the frame of the box.
+    speeds
+        ``(M, w)`` wheel speeds [m/s].
+    places
+        ``(M, 3)`` places, see `errors_of`.
+    path, wheels
+        The curve around the box, and the commands of a robot.
+    """
+    n_robots, n_wheels = speeds.shape
+    n_actions = len(wheels.gains)
+    span = 2.0 * wheels.radius + CLEARANCE_M
+    reach = span + 2.0 * (DEPTH + 1) * wheels.period * wheels.limit
+    plans = np.empty((DEPTH, n_robots, 2))
+    for level in range(DEPTH):
+        plans[level] = poses[:, :2]
+    now = np.empty((DEPTH + 1, n_wheels))
+    chosen = np.zeros(n_robots, np.int64)
+    trail = np.empty((DEPTH, 2))
+    for r in order:
+        apart = np.sqrt((poses[:, 0] - poses[r, 0]) ** 2 + (poses[:, 1] - poses[r, 1]) ** 2)
+        apart[r] = np.inf
+        near = np.nonzero(apart < reach)[0]
+        place = (places[r, 0], places[r, 1], places[r, 2])
+        start = (poses[r, 0], poses[r, 1], poses[r, 2])
+        now[0] = speeds[r]
+        best = np.inf
+        for a in range(n_actions):
+            first = _moved(wheels, start, now[0], a, now[1])
+            cost_a = 10.0 * _crowding(first[0], first[1], plans[0], near, span)
+            cost_a += 0.1 * _cost(path, first, place)
+            for b in range(n_actions):
+                second = _moved(wheels, first, now[1], b, now[2])
+                cost_b = cost_a + 10.0 * _crowding(second[0], second[1], plans[1], near, span)
+                cost_b += 0.1 * _cost(path, second, place)
+                if cost_b >= best:
+                    continue
+                for c in range(n_actions):
+                    third = _moved(wheels, second, now[2], c, now[3])
+                    cost = cost_b + 10.0 * _crowding(third[0], third[1], plans[2], near, span)
+                    if cost >= best:
+                        continue
+                    cost += 1.1 * _cost(path, third, place)
+                    if cost < best:
+                        best = cost
+                        chosen[r] = a
+                        trail[0, 0], trail[0, 1] = first[0], first[1]
+                        trail[1, 0], trail[1, 1] = second[0], second[1]
+                        trail[2, 0], trail[2, 1] = third[0], third[1]
+        for level in range(DEPTH):
+            plans[level, r] = trail[level]
+    return chosen
+
+
+@njit(cache=True)
+def standing(poses: FloatArray, places: FloatArray, path: Path) -> float:
+    """Return the fraction of the robots that stand at their places, facing the box."""
+    largest_left, largest_off, largest_turn = STANDING
+    count = 0
+    for r in range(len(poses)):
+        pose = (poses[r, 0], poses[r, 1], poses[r, 2])
+        place = (places[r, 0], places[r, 1], places[r, 2])
+        left, off, turn = errors_of(path, pose, place)
+        count += left < largest_left and abs(off) < largest_off and turn < largest_turn
+    return count / len(poses)
