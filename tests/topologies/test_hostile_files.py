@@ -79,7 +79,7 @@ def test_what_is_no_text_is_told_at_once(
     error = capsys.readouterr().err
     assert re.fullmatch(r"nested-agents: error: [ -~]{1,1300}\n", error), error
     words = {"large": "is larger than", "latin-1": "is not UTF-8 text", "absent": "No such file"}
-    assert words.get(what, "is no file") in error
+    assert words.get(what, "is not a regular file") in error
 
 
 def test_a_file_that_is_not_there_is_told_so(tmp_path: Path, monkeypatch, capsys) -> None:

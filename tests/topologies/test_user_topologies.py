@@ -168,7 +168,7 @@ def test_bad_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metadata, "entry_points", offered)
     with pytest.raises(ValueError, match="topology 'line': cannot be loaded: ModuleNotFoundError"):
         build(parse("line"), AGENTS)
-    with pytest.raises(ValueError, match="is no topology, but a float"):
+    with pytest.raises(ValueError, match="is of type float, allowed: topology"):
         build(parse("pi"), AGENTS)
     monkeypatch.setattr(metadata, "entry_points", points(("line", "a:f"), ("line", "b:f")))
     with pytest.raises(ValueError, match="'line' is offered twice: a:f, b:f"):
