@@ -25,7 +25,7 @@ from rich.table import Table
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.interface.experience import Experience, Observation
+from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
@@ -79,13 +79,13 @@ def _episode(
 ) -> list[tuple[float, float, float]]:
     """Return what every decision, step and fixed load took [s]; episodes do not end early."""
     seed = world_seed(0, episode)
-    seen = Observation(scenario.reset(seed, episode), scenario)
-    team.reset(seed, episode)
-    if learn:
-        team.begin_episode()
+    states = scenario.reset(seed, episode)
+    previous = None
+    team.reset(seed, episode, learn=learn)
     taken = []
     for step in range(steps):
         begun = thread_time()
+        seen = team.observe(scenario, states, previous)
         decision = team.act(seen)
         decided = thread_time()
         transition = scenario.step(decision.joint_action)
@@ -94,7 +94,8 @@ def _episode(
         taken.append((decided - begun, stepped - decided, thread_time() - stepped))
         if learn:
             team.learn(Experience(seen, decision, transition, step == steps - 1))
-        seen = Observation(transition.states, scenario, previous=decision.joint_action)
+        states = transition.states
+        previous = decision.joint_action
     return taken
 
 

@@ -24,7 +24,7 @@ for _ in na.control_loop(scenario, team, episodes=5, steps=100, seed=0):
 #
 # Agents decide in the order of the hierarchy, and each hears all agents before it.
 
-observation = na.Observation(scenario.reset(seed=7), scenario)
+observation = team.observe(scenario, scenario.reset(seed=7))
 decision = team.act(observation, explore=True, inspect=True)
 print(na.explain_decision(decision))
 
@@ -40,7 +40,7 @@ index = [variable.name for variable in variables].index(name)
 x = np.linspace(variables[index].low, variables[index].high, 101)
 
 figure, axes = plt.subplots(figsize=(5, 3.2), layout="constrained")
-for agent, present in zip(scenario.agents, observation.present, strict=True):
+for agent, present in zip(scenario.agents, observation.states, strict=True):
     states = np.tile(present, (len(x), 1))
     states[:, index] = x
     axes.plot(x, team.value(agent, states), label=agent)

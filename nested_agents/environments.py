@@ -134,13 +134,14 @@ def turns(
     ValueError
         If there is no such key or topology, or a value is out of range; one line.
     """
+    from .core.interface.abilities import interactions_of
     from .scenarios.adapters.turns import TurnBasedEnv
     from .topologies import build, parse
 
     env = parallel(kind, steps, **options)
     settings = parse(topology)
     world = env.scenario
-    hierarchy = build(settings, world.agents, world.groups, world.interactions)
+    hierarchy = build(settings, world.agents, world.groups, interactions_of(world))
     return TurnBasedEnv(env, hierarchy, settings.failures)
 
 

@@ -16,7 +16,6 @@ from nested_agents import (
     BoxPushing,
     BoxPushingSettings,
     FuzzyAgents,
-    Observation,
     Team,
     policy_seed,
 )
@@ -59,9 +58,9 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
     beliefs, errors = [], []
     for episode in range(episodes):
         states = scenario.reset(world_seed(SEED, episode), episode)
-        team.begin_episode()
+        team.reset(0, 0, learn=True)
         for step in range(STEPS):
-            seen = Observation(states, scenario)
+            seen = team.observe(scenario, states)
             prediction = model.predict(seen)
             assert isinstance(prediction, EmbodiedPrediction)
             decision = team.act(seen)

@@ -21,7 +21,7 @@ from itertools import product
 
 import numpy as np
 
-from nested_agents import FuzzyAgents, Observation, Prediction, Session, Spec
+from nested_agents import FuzzyAgents, Prediction, Session, Spec
 from nested_agents.parts import Elimination, MaxPlus, Scope
 from nested_agents.study import EVALUATION_WORLDS, trials_of, world_seed
 
@@ -107,9 +107,9 @@ def situations(robots: int, seed: int, episodes: int) -> Iterator[tuple[Session,
         world = world_seed(seed, EVALUATION_WORLDS + episode)
         states = session.scenario.reset(world, episode)
         for step in range(100):
-            seen = Observation(states, session.scenario)
             if step % EVERY == 0:
                 yield session, session.scenario.predict()
+            seen = session.team.observe(session.scenario, states)
             decision = session.team.act(seen, explore=False)
             transition = session.scenario.step(decision.joint_action)
             states = transition.states

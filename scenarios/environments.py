@@ -19,6 +19,7 @@ from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
+from ..core.interface.abilities import Recorded, measurements_of
 from ..core.interface.recording import EpisodeRecorder
 from ..core.interface.scenario import Scenario, Transition
 from ..core.numerics import FloatArray, IntArray
@@ -140,7 +141,9 @@ class Environment(ABC):
         if world is None:
             world = int(self._seeds.integers(2**63))
         states = self.scenario.reset(world, self._episode)
-        self._recorder = EpisodeRecorder(self.scenario) if self.render_mode else None
+        self._recorder = None
+        if self.render_mode is not None and isinstance(self.scenario, Recorded):
+            self._recorder = EpisodeRecorder(self.scenario)
         return states
 
     def advance(self, joint_action: IntArray) -> tuple[Transition, bool]:
@@ -212,7 +215,7 @@ class AgentsEnv(Environment, ParallelEnv):
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observations, Infos]:
         """Start an episode, see `Environment.begin`; return observations and infos by agent."""
-        return self._observe(self.begin(seed, options), self.scenario.measure())
+        return self._observe(self.begin(seed, options), measurements_of(self.scenario))
 
     def step(
         self, actions: Mapping[str, int | IntArray]
@@ -296,7 +299,7 @@ class JointEnv(Environment, gymnasium.Env):
         """Start an episode, see `Environment.begin`; return observation and info."""
         super().reset(seed=seed)
         states = self.begin(seed, options)
-        return self._player.observe(states), self.info(self.scenario.measure())
+        return self._player.observe(states), self.info(measurements_of(self.scenario))
 
     def step(self, action: ArrayLike) -> tuple[FloatArray, float, bool, bool, dict[str, object]]:
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""

@@ -120,10 +120,6 @@ class LineUp(Scenario):
             "seconds": {"physics": 0.0, "sensors": 0.0},
         }
 
-    def constants_of_episode(self) -> Mapping[str, object]:
-        """Return the period of recorded steps."""
-        return {"dt": PERIOD}
-
     def draw(self, path: Path | str) -> None:
         """Draw rails, carts and the goal line to a picture file."""
         from matplotlib.figure import Figure

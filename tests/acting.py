@@ -7,7 +7,8 @@ import numpy as np
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.experience import Decision, Experience, Observation
-from nested_agents.core.interface.scenario import Transition, checked_scenario
+from nested_agents.core.interface.prediction import Prediction
+from nested_agents.core.interface.scenario import Transition, checked_scenario, prediction_of
 
 
 def fuzzy(team: Team) -> FuzzyAgents:
@@ -15,12 +16,17 @@ def fuzzy(team: Team) -> FuzzyAgents:
     return team.only(FuzzyAgents)
 
 
-def look(world: Any, states: Any = None, **more: Any) -> Observation:
+def look(
+    world: Any,
+    states: Any = None,
+    prediction: Prediction | None = None,
+    previous: Any = None,
+) -> Observation:
     """What is seen in a world; without states, those of nobody."""
     scenario = checked_scenario(world)
     if states is None:
         states = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
-    return Observation(states, scenario, **more)
+    return Observation(states, prediction or prediction_of(scenario), previous)
 
 
 def joint_of(team: Team, world: Any, states: Any = None, *, explore: bool = True, **more: Any):

@@ -15,7 +15,8 @@ from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox, is_fully_communicating
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.experience import Experience, Observation
-from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
+from ..interface.measures import Measure
+from ..interface.prediction import NOT_EXPLORING, UNPREDICTED, Prediction
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
@@ -23,9 +24,10 @@ from ..models.predictors import GivenPredictor, Mirror
 from ..models.team_model import TeamModel
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
 from ..plugins.words import must_inherit
-from ..search.evaluator import NOBODY, NOTHING_GIVEN, Aggregation, DecisionContext, Evaluator
+from ..search.evaluator import NOBODY, Aggregation, DecisionContext, Evaluator
 from ..search.exploration import Explorer
-from .valuing import Present, evaluator_of, is_private
+from .action_counts import ActionCounts
+from .valuing import evaluator_of, is_private
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
 
@@ -57,10 +59,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         Predictor, with self-model and calibration.
     mirror
         Adds mirror images to experience; None if experience is not mirrored.
-    seen
-        ``(n, A)`` counts of the actions of every agent, initially one.
-    given
-        ``(n, A, n, A)`` counts given each action of another agent, for conditional teammate models.
+    action_counts
+        Counts of the actions of all agents, for models of teammates.
+    views
+        Own views of the agents; None if all share prediction and weights.
 
     Raises
     ------
@@ -78,7 +80,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.members = context.members
         self.action_set = scenario.action_set
         n = len(hierarchy)
-        n_actions = len(scenario.action_set)
         if settings.values_actions and not isinstance(settings.predictor, GivenPredictor):
             raise ValueError(
                 f"learner.predictor.kind = {settings.predictor.kind!r}: learner.kind = "
@@ -100,41 +101,42 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.learner: Learner = settings.build(self.rules, rows)
         must_inherit("learner.kind", self.learner, Learner)
         self._placement = context
+        self._is_checked = False
         self._evaluators: dict[Hierarchy, Evaluator | None] = {}
         self._left = NOBODY
         self._actions_of_left = NOBODY
-        self.is_private = is_private(settings, scenario)
         self.views: Views | None = None
+        self.costs: tuple[Measure, ...] = ()
         self.evaluator = self._evaluator()
-        self._searches_jointly = self._can_search_jointly(context)
         self._neutral = np.full(n, self.action_set.neutral)
         own_rows = dict(zip(self.members.tolist(), self.rows.tolist(), strict=True))
         self._row_of = [own_rows.get(agent) for agent in range(n)]
-        if self.is_private:
+        if is_private(settings, scenario):
             n_rules = self.learner.theta.shape[1]
             plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
             self.views = Views(settings, context, self._row_of, n_rules, self.model, plans=plans)
             self.costs = self.views.costs
+        self._searches_jointly = self._can_search_jointly(context)
         self.explorer: Explorer = settings.exploration.build(n)
         must_inherit("learner.exploration.kind", self.explorer, Explorer)
         self.rng = np.random.Generator(np.random.PCG64(context.seed))
-        self.seen: FloatArray = np.ones((n, n_actions))
-        conditional = settings.decision.teammates == "conditional"
-        is_counted = conditional and self.evaluator is not None
-        self.given: FloatArray = np.ones((n, n_actions) * 2 if is_counted else (0, 0, 0, 0))
+        is_conditional = settings.decision.teammates == "conditional" and bool(self.evaluator)
+        n_actions = len(scenario.action_set)
+        self.action_counts = ActionCounts(n, n_actions, is_conditional=is_conditional)
 
     def _evaluator(self) -> Evaluator | None:
         """Return the search for the agents that are present."""
         learned = self.learner if isinstance(self.learner, Evaluator) else None
-        present = Present(self.hierarchy, self._left)
-        return evaluator_of(self.settings, self.rules, learned, self._placement, present)
+        return evaluator_of(
+            self.settings, self.rules, learned, self._placement, self.hierarchy, self._left
+        )
 
     def _can_search_jointly(self, context: AgentContext) -> bool:
         """Return whether one search finds the actions of all agents, see `act`."""
         return (
             self.evaluator is not None
             and context.is_whole
-            and not self.is_private
+            and self.views is None
             and type(self.evaluator).decide is not Evaluator.decide
             and not context.messages_fail
             and is_fully_communicating(context.hierarchy)
@@ -163,8 +165,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Memory of the consequent weights [bytes]."""
         return self.learner.theta.nbytes
 
-    def check(self, seen: Observation) -> None:
-        """Refuse a scenario without the predictions that the search requires.
+    def _check(self, prediction: Prediction) -> None:
+        """Refuse a prediction without what the search requires.
 
         Raises
         ------
@@ -174,40 +176,41 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         rule = self.settings.decision.rule
         if self.evaluator is None or rule == "value":
             return
-        prediction = self.model.predict(seen)
-        neutral = np.full(len(self.hierarchy), self.action_set.neutral)
-        if prediction is None or prediction.rewards(neutral[None]) is None:
+        if prediction.rewards(self._neutral[None]) is None:
             raise ValueError(
                 f"learner.decision.rule = {rule!r}: no rewards are predicted, use value"
             )
-        if self.evaluator.continues and prediction.after(neutral) is None:
+        if self.evaluator.continues and prediction.after(self._neutral) is None:
             raise ValueError(
                 "learner.decision.evaluator: plans of several decisions need a scenario that "
                 "predicts from predicted states"
             )
 
-    def begin_episode(self) -> None:
-        """Start an episode of training."""
-        self.explorer.begin_episode()
-        self.learner.begin_episode()
+    def reset(self, episode: int, *, learn: bool) -> None:
+        """Start an episode."""
+        if learn:
+            self.explorer.begin_episode()
+            self.learner.begin_episode()
 
     def observe(self, seen: Observation, *, explore: bool) -> FuzzyInputs:
         """Return the inputs of a decision."""
-        left = seen.present
+        left = seen.states
         if self._n_told:  # columns for received actions, which `act` fills in
             missing = np.full((len(left), self._n_told), float(len(self.action_set)))
             left = np.hstack([left, missing])
-        prediction = None if self.settings.values_actions else self.model.predict(seen)
+        prediction = UNPREDICTED if self.settings.values_actions else self.model.predict(seen)
+        if not self._is_checked:
+            self._check(prediction)
+            self._is_checked = True
         theta = self.learner.theta
-        shared = UNPREDICTED if prediction is None else prediction
         return FuzzyInputs(
             left=left,
             previous=seen.previous if self.settings.decision.unseen == "last" else None,
-            prediction=shared,
+            prediction=prediction,
             weights=weights_by_agent(self._row_of, theta),
-            frequencies=self.seen / self.seen.sum(axis=1, keepdims=True),
+            frequencies=self.action_counts.frequencies,
             explore=explore,
-            views={} if self.views is None else self.views.by_agent(seen, shared, theta),
+            views={} if self.views is None else self.views.by_agent(seen, prediction, theta),
         )
 
     def _joint_search(self, inputs: FuzzyInputs) -> IntArray | None:
@@ -259,9 +262,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self._senders:
             told = known[self._senders[agent]]
             inputs.left[agent, self.scenario.state_space.n_variables :][: len(told)] = told
-        given = NOTHING_GIVEN
-        if self.given.size:
-            given = self.given[agent] / self.given[agent].sum(axis=2, keepdims=True)
         view = inputs.views.get(agent) or OwnView(inputs.prediction, inputs.weights)
         values = self.evaluator.values(
             DecisionContext(
@@ -271,7 +271,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
                 weights=view.weights,
                 frequencies=inputs.frequencies,
                 rng=self.rng,
-                given=given,
+                given=self.action_counts.frequencies_given(agent),
                 told=senders,
                 present=inputs.left,
             )
@@ -282,7 +282,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             )
         if inputs.values is not None:
             inputs.values[agent] = values.copy()
-        if self.is_private and self.evaluator.expected is not None:
+        if self.views is not None and self.evaluator.expected is not None:
             inputs.expected[agent] = self.evaluator.expected.copy()
         if inputs.explore:
             return self.explorer.choose(agent, values, self.rng)
@@ -290,18 +290,16 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def conclude(self, inputs: FuzzyInputs, joint_action: IntArray) -> None:
         """Advance exploration and count the actions of all agents, if the agents explore."""
-        inputs.agreement = agreement(inputs.expected, joint_action)
         if not inputs.explore or self.evaluator is None:
             return
         self.explorer.advance()
-        every = np.arange(len(joint_action))
-        self.seen[every, joint_action] += 1.0
-        if self.given.size:
-            self.given[every[:, None], joint_action[:, None], every, joint_action] += 1.0
+        self.action_counts.add(joint_action)
 
-    def decision_costs(self, inputs: FuzzyInputs) -> Mapping[str, float]:
+    def decision_costs(self, inputs: FuzzyInputs, joint_action: IntArray) -> Mapping[str, float]:
         """Return agreement and communication, for agents with views of their own."""
-        return {} if self.views is None else self.views.decision_costs(inputs, self.hierarchy)
+        if self.views is None:
+            return {}
+        return self.views.decision_costs(agreement(inputs.expected, joint_action), self.hierarchy)
 
     def record_values(self, inputs: FuzzyInputs) -> None:
         """Keep the values of actions in this decision; each agent then searches on its own."""
@@ -368,10 +366,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Count changed weights."""
         self.counts.weight_updates += updates
 
-    def check_scenario(self, scenario: Scenario) -> None:
-        """Refuse a scenario with other state variables, actions or owners of weights."""
-        self._carried_rows(scenario, self.members)
-
     def _carried_rows(self, other: Scenario, members: IntArray) -> IntArray:
         """Return the row of these weights from which every row in another scenario starts."""
         return carried_rows(
@@ -395,11 +389,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.learner.warm_start(former.learner, rows)
         self.explorer.warm_start(former.explorer)
         self.rng.bit_generator.state = former.rng.bit_generator.state
-        for agent, row in zip(self.members, self.rows, strict=True):
-            alike = former.members[former.rows == rows[row]]
-            self.seen[agent] = former.seen[alike].mean(axis=0)
-        if self.given.shape == former.given.shape:
-            self.given = former.given.copy()
+        alike = [former.members[former.rows == rows[row]] for row in self.rows]
+        pairs = list(zip(self.members.tolist(), alike, strict=True))
+        self.action_counts.warm_start(former.action_counts, pairs)
         self.model.warm_start(former.model)
 
     def state_dict(self) -> StateDict:
@@ -407,10 +399,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         memory: StateDict = {
             "generator": words_of(self.rng),
             "explorer": self.explorer.memory,
-            "seen": self.seen,
+            **self.action_counts.state_dict(),
         }
-        if self.given.size:
-            memory["given"] = self.given
         memory |= {f"learner.{key}": array for key, array in self.learner.state_dict().items()}
         for name, part in self.model.adaptive.items():
             memory |= {f"{name}.{key}": array for key, array in part.state_dict().items()}
@@ -439,9 +429,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
                 )
         set_words(self.rng, state["generator"])
         self.explorer.memory[:] = state["explorer"]
-        self.seen = state["seen"].copy()
-        if self.given.size:
-            self.given = state["given"].copy()
+        self.action_counts.load_state_dict(state)
         self.learner.load_state_dict(select_prefix("learner.", state))
         for name, part in self.model.adaptive.items():
             part.load_state_dict(select_prefix(f"{name}.", state))

@@ -22,14 +22,16 @@ from typing import Literal
 
 import numpy as np
 
+from ..interface.abilities import Embodiment, horizon_of
 from ..interface.prediction import (
+    Assumptions,
     Blocks,
     EmbodiedPrediction,
     Prediction,
     Tables,
     rewards_of,
 )
-from ..interface.scenario import Embodiment, Scenario, Transition, checked_scenario
+from ..interface.scenario import Scenario, Transition, checked_scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
 
@@ -118,7 +120,12 @@ class JointAgents(Scenario):
         self.scenario = scenario
         self.whole = each == "team"
         self.measures = scenario.measures
-        self.horizon = scenario.horizon
+        self.horizon = horizon_of(scenario)
+        if not self.whole and isinstance(scenario, Embodiment):
+            self.nominal_effects = scenario.nominal_effects
+            self.constants = scenario.constants
+            self.levers = scenario.levers
+            self.regression_shapes = scenario.regression_shapes
         self._n_each = space.n_variables if self.whole else space.n_own
         of_block = [scenario.agents[i] for i in self.blocks[0]]
         if self.whole:
@@ -158,11 +165,6 @@ class JointAgents(Scenario):
         return replace(transition, states=self._states(transition.states), reward=reward)
 
     @property
-    def predicts(self) -> bool:
-        """Whether the scenario has a prediction."""
-        return self.scenario.predicts
-
-    @property
     def lacks_prediction(self) -> str:
         """Reason why the scenario has no prediction."""
         return self.scenario.lacks_prediction
@@ -170,12 +172,11 @@ class JointAgents(Scenario):
     def predict(self) -> JointPrediction | None:
         """Return the prediction from the present state, if there is one."""
         prediction = self.scenario.predict()
-        return None if prediction is None else JointPrediction(prediction, self)
-
-    def embodiment(self) -> Embodiment | None:
-        """Return the scenario's bodies, if every agent is a body."""
-        bodies = None if self.whole else self.scenario.embodiment()
-        return None if bodies is None else JointEmbodiment(bodies, self)
+        if prediction is None:
+            return None
+        if not self.whole and isinstance(prediction, EmbodiedPrediction):
+            return JointBodiesPrediction(prediction, self)
+        return JointPrediction(prediction, self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
         """Return the actions ``(..., n)`` of all agents for the actions of joint agents."""
@@ -209,6 +210,7 @@ class JointPrediction(Prediction, Tables):
     def __init__(self, prediction: Prediction, joint: JointAgents) -> None:
         self._prediction = prediction
         self._joint = joint
+        self.repeats = prediction.repeats
         self._tables = prediction.tables()
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -249,31 +251,6 @@ class JointPrediction(Prediction, Tables):
         return self._tables.reward_table()
 
 
-class JointEmbodiment(Embodiment):
-    """Bodies of a scenario in which every body is one agent."""
-
-    def __init__(self, bodies: Embodiment, joint: JointAgents) -> None:
-        self._bodies = bodies
-        self._joint = joint
-        self.nominal_effects = bodies.nominal_effects
-        self.constants = bodies.constants
-        self.levers = bodies.levers
-        self.regression_shapes = bodies.regression_shapes
-
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> EmbodiedPrediction:
-        """Return the prediction for assumed effects and constants."""
-        return JointBodiesPrediction(self._bodies.predict_with(effects, constants), self._joint)
-
-    def predict_poses(
-        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
-    ) -> EmbodiedPrediction:
-        """Return the prediction by learned weights."""
-        prediction = self._bodies.predict_poses(effects, weights, decisions)
-        return JointBodiesPrediction(prediction, self._joint)
-
-
 class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
     """Prediction of bodies for self-models and calibration, for joint agents."""
 
@@ -281,6 +258,10 @@ class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):
         super().__init__(prediction, joint)
         self._bodies = prediction
         self.groups = prediction.groups
+
+    def assuming(self, assumptions: Assumptions) -> JointBodiesPrediction:
+        """Return the prediction under other assumptions."""
+        return JointBodiesPrediction(self._bodies.assuming(assumptions), self._joint)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds that the actions of bodies command."""

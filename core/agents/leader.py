@@ -91,7 +91,7 @@ class Leader:
         goes_on = 0 < self._duration < options.limit and options.advance()
         if not goes_on:
             states = options.begin(self._decide(options, explore=explore))
-            observation = observation._replace(present=states)
+            observation = observation._replace(states=states)
             self._duration = 0
         self._duration += 1
         return observation, options.joint_action()
@@ -101,9 +101,9 @@ class Leader:
         if not self.agents:
             return options.rule()
         (agent,) = self.agents
-        observation = Observation(options.observe()[None], self._view)
+        observation = Observation(options.observe()[None])
         if self._decided is not None and explore:
-            self._learn(observation.present, terminated=False, last=False)
+            self._learn(observation.states, terminated=False, last=False)
         inputs = agent.observe(observation, explore=explore)
         action = agent.act(inputs, INBOX)
         agent.conclude(inputs, action)

@@ -15,7 +15,7 @@ from numbers import Integral
 
 import numpy as np
 
-from ..interface.experience import Experience, Observation
+from ..interface.experience import Experience
 from ..interface.scenario import Transition, checked_scenario, checked_transition
 from ..numerics import FloatArray, IntArray, working_seconds
 from ..plugins.words import expect
@@ -104,13 +104,12 @@ def control_loop(
     for k in range(episodes):
         episode = first_episode + k
         seed_of_world = world_seed(seed, first_world + k)
-        seen = Observation(space.checked(world.reset(seed_of_world, episode), world.agents), world)
-        team.reset(seed_of_world, episode)
-        if learn:
-            team.begin_episode()
-        team.check(seen)
+        states = space.checked(world.reset(seed_of_world, episode), world.agents)
+        previous = None
+        team.reset(seed_of_world, episode, learn=learn)
         for step in range(steps):
             begin = working_seconds()
+            seen = team.observe(world, states, previous)
             decision = team.act(seen, explore=explore)
             decided = working_seconds()
             returned = world.step(decision.joint_action.copy())
@@ -122,7 +121,7 @@ def control_loop(
             yield StepRecord(
                 episode=episode,
                 step=step,
-                states=seen.present,
+                states=states,
                 joint_action=decision.joint_action,
                 transition=transition,
                 last=last,
@@ -132,4 +131,5 @@ def control_loop(
             )
             if last:
                 break
-            seen = Observation(transition.states, world, previous=decision.joint_action)
+            states = transition.states
+            previous = decision.joint_action

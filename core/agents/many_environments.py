@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface.agents import StateDict
+from ..interface.agents import StateDict, Vectorized
 from ..interface.environments import Environments
 from ..interface.experience import Observation
 from ..interface.scenario import Scenario
@@ -66,7 +66,7 @@ class ManyEnvironmentsLoop:
     def __init__(
         self, environments: Environments, scenario: Scenario, team: Team, steps: int, seed: int
     ) -> None:
-        unable = [part for part in team.parts if not part.is_vectorized]
+        unable = [part for part in team.parts if not isinstance(part, Vectorized)]
         if unable:
             raise ValueError(f"{type(unable[0]).__name__}: acts in one environment only")
         self._environments = environments
@@ -138,7 +138,7 @@ class ManyEnvironmentsLoop:
 
     def step(self) -> list[Finished]:
         """Take one step in all environments; return the episodes that end, by environment."""
-        decision = self._team.act(Observation(self._states, self._scenario), explore=True)
+        decision = self._team.act(Observation(self._states), explore=True)
         transitions = self._environments.step(decision.joint_action)
         self._joint_actions.append(decision.joint_action)
         self._steps += 1

@@ -17,6 +17,7 @@ from ..hierarchy.stages import Inbox
 from ..interface.agents import AgentContext, Agents, StateDict
 from ..interface.experience import Experience, Observation
 from ..interface.scenario import Transition
+from ..learners import check_prediction
 from ..learners.learner import CORE, TeamSettings
 from ..numerics import AnyArray, FloatArray, IntArray
 from ..search.exploration import warm_start_refusal
@@ -109,14 +110,16 @@ class PeerAgents(Agents[PeerInputs]):
     """
 
     def __init__(self, settings: PeerSettings, context: AgentContext) -> None:
+        check_prediction(settings, context.scenario)
         hierarchies = (context.hierarchy,) if settings.uses_hierarchy else ()
         self.peer: Peer = settings.build(context.scenario, context.seed, *hierarchies)
         self.rng = self.peer.rng
         self.is_stochastic = self.peer.is_stochastic
 
-    def begin_episode(self) -> None:
-        """Start an episode of learning."""
-        self.peer.begin_episode()
+    def reset(self, episode: int, *, learn: bool) -> None:
+        """Start an episode."""
+        if learn:
+            self.peer.begin_episode()
 
     def observe(self, seen: Observation, *, explore: bool) -> PeerInputs:
         """Return the inputs of a decision."""

@@ -14,11 +14,27 @@ from ..hierarchy.failures import LeftAgents, MessageFailure
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
 from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
-from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
+from ..interface.abilities import options_of
+from ..interface.agents import (
+    AgentContext,
+    Agents,
+    Counts,
+    Inspectable,
+    ObservesJointActions,
+    Rearrangeable,
+    ReportsCosts,
+    ReportsResources,
+    SendsPayloads,
+    StateDict,
+    ValuesStates,
+    Vectorized,
+    select_prefix,
+)
 from ..interface.environments import Transitions
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.measures import Measure
-from ..interface.scenario import Scenario, checked_scenario
+from ..interface.prediction import UNPREDICTED
+from ..interface.scenario import Scenario, checked_scenario, prediction_of
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
@@ -54,6 +70,8 @@ class Team:
     ----------
     parts
         The agents, one part for each kind.
+    needs_prediction
+        Whether some agents decide or learn by the scenario's predictions.
     leader
         The leader above all agents, if the scenario has options for one.
     messages
@@ -92,6 +110,7 @@ class Team:
             failures = ()
         self.hierarchy = hierarchy
         self.action_set = checked.action_set
+        self.needs_prediction = settings.needs_prediction
         kinds = settings.members(checked, hierarchy)
         seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
         parts: list[Agents[Any]] = []
@@ -106,21 +125,27 @@ class Team:
             if kept is not None:
                 begin_with(parts[-1], kept, len(parts) - 1)
         self.parts = tuple(parts)
-        self.costs = costs_of(parts)
+        numbered = dict(enumerate(parts))
+        self._senders = {k: p for k, p in numbered.items() if isinstance(p, SendsPayloads)}
+        self._reporting = {k: p for k, p in numbered.items() if isinstance(p, ReportsCosts)}
+        self._observing = {k: p for k, p in numbered.items() if isinstance(p, ObservesJointActions)}
+        sent = [MESSAGES] if self._senders else []
+        self.costs = join_costs([*sent, *(m for p in self._reporting.values() for m in p.costs)])
         self.decision_costs: Mapping[str, float] = {}
         self._n_received = 0
-        self._has_payloads = any(part.sends_payload for part in parts)
         self.messages = Messages(
-            hierarchy, failures, len(checked.action_set), has_payloads=self._has_payloads
+            hierarchy, failures, len(checked.action_set), has_payloads=bool(self._senders)
         )
         self._present = hierarchy
         self._actions_of_left = _actions_of_left(failures, checked)
         self.leader = None
-        if checked.options is not None:
+        self._scenario: Scenario = checked
+        self._options = options_of(checked)
+        if self._options is not None:
             if failures or settings.n_environments > 1:
                 key = "topology.failures" if failures else "learner.environments"
                 raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
-            self.leader = Leader(checked.options, seed.spawn(1)[0])
+            self.leader = Leader(self._options, seed.spawn(1)[0])
         self._all = self.parts if self.leader is None else (*self.parts, *self.leader.agents)
 
     @cached_property
@@ -153,16 +178,22 @@ class Team:
 
     @property
     def counts(self) -> Counts:
-        """Number of evaluations of all parts so far."""
+        """Number of evaluations so far, of the parts that count them."""
         total = Counts()
         for part in self._all:
-            total.add(part.counts)
+            if isinstance(part, ReportsResources):
+                total.add(part.counts)
         return total
 
     @property
     def weight_bytes(self) -> int:
         """Memory of all learned weights [bytes]."""
-        return sum(part.weight_bytes for part in self._all)
+        return sum(
+            part.weight_bytes
+            if isinstance(part, ReportsResources)
+            else sum(array.nbytes for array in part.state_dict().values())
+            for part in self._all
+        )
 
     @contextmanager
     def drawing_apart(self) -> Iterator[None]:
@@ -174,20 +205,7 @@ class Team:
             generator.state = state
 
     def check(self, observation: Observation) -> None:
-        """Refuse a scenario that lacks what the agents decide by.
-
-        Raises
-        ------
-        ValueError
-            One line.
-        """
-        if (self.leader is None) != (observation.scenario.options is None):
-            raise ValueError("scenario.leader: build the team in a scenario with the same leader")
-        for part in self.parts:
-            part.check(observation)
-
-    def check_scenario(self, scenario: Scenario) -> None:
-        """Refuse another scenario in which the trained team cannot act.
+        """Refuse an observation without what the agents decide by.
 
         Raises
         ------
@@ -195,20 +213,50 @@ class Team:
             One line.
         """
         for part in self.parts:
-            part.check_scenario(scenario)
+            part.observe(observation, explore=False)
 
-    def reset(self, seed: int | np.random.SeedSequence, episode: int) -> None:
-        """Start an episode; random message failures follow from `seed`."""
+    def observe(
+        self, scenario: Scenario, states: FloatArray, previous: IntArray | None = None
+    ) -> Observation:
+        """Return the observation of a scenario, with its prediction if the agents need one.
+
+        Parameters
+        ----------
+        scenario
+            The scenario in its present state.
+        states
+            ``(n, d)`` present states of the agents.
+        previous
+            ``(n,)`` previous joint action of the episode, if there is one.
+
+        Raises
+        ------
+        ValueError
+            If the scenario predicts something that is no prediction, or has no leader where the
+            team has one; one line.
+        """
+        if previous is None:  # an episode begins
+            self._options = options_of(scenario)
+            if (self.leader is None) != (self._options is None):
+                raise ValueError(
+                    "scenario.leader: build the team in a scenario with the same leader"
+                )
+            self._scenario = scenario
+        prediction = prediction_of(scenario) if self.needs_prediction else UNPREDICTED
+        return Observation(states, prediction, previous)
+
+    def reset(
+        self, seed: int | np.random.SeedSequence, episode: int, *, learn: bool = False
+    ) -> None:
+        """Start an episode, of training if the team is to `learn`.
+
+        Random message failures follow from `seed`.
+        """
         self.messages.reset(seed, episode)
         if self.leader is not None:
             self.leader.reset()
         for part in self._all:
-            part.reset(episode)
-
-    def begin_episode(self) -> None:
-        """Start an episode of training."""
-        for part in self._all:
-            part.begin_episode()
+            part.reset(episode, learn=learn)
 
     def act(
         self, observation: Observation, *, explore: bool = True, inspect: bool = False
@@ -234,18 +282,21 @@ class Team:
         >>> carts = LineUpSettings(carts=2).build()
         >>> chain = Hierarchy(carts.agents, [carts.agents])
         >>> team = Team(BatchTDSettings(), carts, chain, np.random.SeedSequence(0))
-        >>> observation = Observation(carts.reset(0), carts)
+        >>> observation = team.observe(carts, carts.reset(0))
         >>> decision = team.act(observation, explore=False, inspect=True)
         >>> [list(agent.received) for agent in decision.agents]
         [[], ['cart1']]
         """
         if self._present is not self.messages.hierarchy:
             self._rearrange()
-        if inspect and observation.present.ndim > 2:
+        if inspect and observation.states.ndim > 2:
             raise ValueError("inspect = True: a decision of one environment only")
-        options = observation.scenario.options
-        if options is not None and self.leader is not None:
-            observation, skilled = self.leader.lead(options, observation, explore=explore)
+        if self._options is not None and self.leader is not None:
+            led, skilled = self.leader.lead(self._options, observation, explore=explore)
+            if led is not observation:  # an option that begins changes what is predicted
+                if self.needs_prediction:
+                    led = led._replace(prediction=prediction_of(self._scenario))
+                observation = led
             if skilled is not None:
                 self.decision_costs = {measure.name: 0.0 for measure in self.costs}
                 return Decision(skilled, ())
@@ -255,19 +306,21 @@ class Team:
         if inspect:
             inboxes = []
             for part, own in zip(self.parts, inputs, strict=True):
-                part.record_values(own)
+                if isinstance(part, Inspectable):
+                    part.record_values(own)
         joint_action = self._decide(observation, inputs, inboxes)
-        payloads = self._payloads(inputs) if self._has_payloads else NO_PAYLOADS
+        payloads = self._payloads(inputs) if self._senders else NO_PAYLOADS
         self.messages.advance(joint_action, payloads)
-        for part, own in zip(self.parts, inputs, strict=True):
-            part.conclude(own, joint_action)
+        for k, observing in self._observing.items():
+            observing.conclude(inputs[k], joint_action)
         if self.costs:
-            self.decision_costs = self._costs_of_decision(inputs)
+            self.decision_costs = self._costs_of_decision(inputs, joint_action)
         if inboxes is None:
             return Decision(joint_action, inputs)
         values: dict[int, FloatArray] = {}
         for part, own in zip(self.parts, inputs, strict=True):
-            values.update(part.action_values(own))
+            if isinstance(part, Inspectable):
+                values.update(part.action_values(own))
         agents = inspect_agents(
             self.hierarchy.agents, self.action_set.names, joint_action, values, inboxes
         )
@@ -280,7 +333,7 @@ class Team:
         inboxes: list[Inbox] | None = None,
     ) -> IntArray:
         """Return the joint action, decided stage by stage; append the inboxes to a list."""
-        shape = (*observation.present.shape[:-2], len(self.hierarchy))
+        shape = (*observation.states.shape[:-2], len(self.hierarchy))
         joint_action = np.full(shape, self.action_set.neutral)
         by_agent = joint_action.T  # a view with the axis of agents first
         fail = bool(self.messages.failures)
@@ -289,7 +342,7 @@ class Team:
             joint_action[..., left] = self._joint_action_of_left()[left]
         for stage in self._stages:
             part = self.parts[stage.part]
-            payloads = self._payloads(inputs) if part.sends_payload else None
+            payloads = self._payloads(inputs) if stage.part in self._senders else None
             inbox = self.messages.deliver(stage, joint_action, payloads)
             if not len(inbox.agents):
                 continue
@@ -325,7 +378,10 @@ class Team:
         if agent not in names:
             raise ValueError(f"agent = {agent!r}, allowed: {', '.join(names)}")
         index = names.index(agent)
-        return self.parts[self._part_of[index]].value(index, np.asarray(states, dtype=float))
+        part = self.parts[self._part_of[index]]
+        if not isinstance(part, ValuesStates):
+            raise ValueError(f"{type(part).__name__}: has no value function of an agent's states")
+        return part.value(index, np.asarray(states, dtype=float))
 
     def _joint_action_of_left(self) -> IntArray:
         """Return the actions ``(n,)`` of agents that have left; others are neutral."""
@@ -336,30 +392,32 @@ class Team:
         self._present = self.messages.hierarchy
         left = np.flatnonzero(self.messages.left)
         for part in self.parts:
-            part.rearrange(self._present, left, self._joint_action_of_left()[left])
+            if isinstance(part, Rearrangeable):
+                part.rearrange(self._present, left, self._joint_action_of_left()[left])
 
     def _payloads(self, inputs: tuple[object, ...]) -> Payloads:
         """Return the payloads of the messages sent so far, by agent."""
         payloads: dict[int, object] = {}
-        for part, own in zip(self.parts, inputs, strict=True):
-            payloads.update(part.payloads(own))
+        for k, sender in self._senders.items():
+            payloads.update(sender.payloads(inputs[k]))
         return payloads
 
-    def _costs_of_decision(self, inputs: tuple[object, ...]) -> Mapping[str, float]:
+    def _costs_of_decision(
+        self, inputs: tuple[object, ...], joint_action: IntArray
+    ) -> Mapping[str, float]:
         """Return the costs of a decision by the names of `costs`."""
         total = {measure.name: 0.0 for measure in self.costs}
         total[MESSAGES.name] = float(self._n_received)
         self._n_received = 0
-        for part, own in zip(self.parts, inputs, strict=True):
-            for name, value in part.decision_costs(own).items():
+        for k, part in self._reporting.items():
+            for name, value in part.decision_costs(inputs[k], joint_action).items():
                 total[name] += value
         return total
 
     def learn(self, experience: Experience) -> None:
         """Learn from a step. Below a leader, only the leader learns."""
-        options = experience.before.scenario.options
-        if options is not None and self.leader is not None:
-            self.leader.learn(options, experience)
+        if self._options is not None and self.leader is not None:
+            self.leader.learn(self._options, experience)
             return
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)
@@ -367,6 +425,7 @@ class Team:
     def learn_batch(self, decision: Decision, steps: Transitions, last: BoolArray) -> None:
         """Learn from one step of many environments; `last` says which episodes end."""
         for part, inputs in zip(self.parts, decision.inputs, strict=True):
+            assert isinstance(part, Vectorized)  # see `ManyEnvironmentsLoop`
             part.learn_batch(decision.joint_action, inputs, steps, last)
 
     def warm_start(self, former: Team) -> None:
@@ -422,7 +481,7 @@ class Team:
             part.load_state_dict(select_prefix(f"part{k}.", state))
 
 
-def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
+def join_costs(measures: Sequence[Measure]) -> tuple[Measure, ...]:
     """Return the measures of the costs of all parts, each once.
 
     Raises
@@ -431,16 +490,13 @@ def costs_of(parts: Sequence[Agents[Any]]) -> tuple[Measure, ...]:
         If two parts report one cost in different units; one line.
     """
     by_name: dict[str, Measure] = {}
-    if any(part.sends_payload for part in parts):
-        by_name[MESSAGES.name] = MESSAGES
-    for part in parts:
-        for measure in part.costs:
-            known = by_name.setdefault(measure.name, measure)
-            if known != measure:
-                raise ValueError(
-                    f"learner.costs.{measure.name} = {measure.unit!r}: another part of the team "
-                    f"gives it in {known.unit!r}"
-                )
+    for measure in measures:
+        known = by_name.setdefault(measure.name, measure)
+        if known != measure:
+            raise ValueError(
+                f"learner.costs.{measure.name} = {measure.unit!r}: another part of the team gives "
+                f"it in {known.unit!r}"
+            )
     return tuple(by_name.values())
 
 

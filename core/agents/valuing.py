@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from ..hierarchy.hierarchy import Hierarchy
+from ..interface.abilities import PartiallyObserved
 from ..interface.agents import AgentContext
 from ..interface.scenario import Scenario
 from ..learners.learner import LearnerSettings
@@ -15,18 +14,9 @@ from ..search.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
 from ..values.rule_base import RuleBase
 
 
-class Present(NamedTuple):
-    """Agents that are present in decisions."""
-
-    hierarchy: Hierarchy
-    """Hierarchy; agents that have left have no edges."""
-    left: IntArray
-    """``(k,)`` agents that have left."""
-
-
 def is_private(settings: LearnerSettings, scenario: Scenario) -> bool:
     """Return whether every agent has a view of its own, see `views`."""
-    return settings.decision.errors is not None or scenario.is_private
+    return settings.decision.errors is not None or isinstance(scenario, PartiallyObserved)
 
 
 def evaluator_of(
@@ -34,7 +24,8 @@ def evaluator_of(
     rules: RuleBase,
     learned: Evaluator | None,
     context: AgentContext,
-    present: Present,
+    hierarchy: Hierarchy,
+    left: IntArray,
 ) -> Evaluator | None:
     """Return the evaluator of some agents, or None if they act at random.
 
@@ -46,8 +37,10 @@ def evaluator_of(
         The learner, if it evaluates actions itself.
     context
         Where they act.
-    present
-        Agents that are present.
+    hierarchy
+        Hierarchy of the agents that are present; agents that have left have no edges.
+    left
+        ``(k,)`` agents that have left.
 
     Raises
     ------
@@ -57,9 +50,8 @@ def evaluator_of(
     decision = settings.decision
     if decision.rule == "random":
         return None
-    hierarchy = present.hierarchy
     members = context.members.tolist()
-    own = set(members) - set(present.left.tolist())
+    own = set(members) - set(left.tolist())
     if decision.rule != "reward" and not context.is_whole:
         _check_values(hierarchy, set(members), decision.value_of)
     if learned is not None:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
+from ..interface.abilities import Embodiment, PartiallyObserved
 from ..interface.agents import AgentContext
 from ..interface.experience import Observation
 from ..interface.measures import Measure
@@ -70,8 +71,6 @@ class FuzzyInputs:
     """Own views by agent; empty if all agents share prediction and weights."""
     expected: dict[int, IntArray] = field(default_factory=dict)
     """Joint action that an agent expected when it decided, for agents with own views and plans."""
-    agreement: float = 1.0
-    """Share of expected actions that came true, see `agreement`."""
 
 
 class Views:
@@ -116,15 +115,19 @@ class Views:
         self._rows = rows
         self._model = model
         hierarchy = context.hierarchy
+        scenario = context.scenario
+        perceived = len(context.members) * (len(scenario.groups) - 1)
+        if isinstance(scenario, PartiallyObserved):
+            perceived = int(scenario.perceived[context.members].sum())
         # Learners of action values do not predict and need only their own states.
-        perceived = context.scenario.perceived[context.members]
-        self._broadcast = 0.0 if settings.values_actions else float(perceived.sum())
+        self._broadcast = 0.0 if settings.values_actions else float(perceived)
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
+            n_constants = 0
             needs_constants = settings.decision.errors.constants and model.predictor is None
-            bodies = context.scenario.embodiment() if needs_constants else None
+            if needs_constants and isinstance(scenario, Embodiment):
+                n_constants = len(scenario.constants)
             valued = concerned(hierarchy, settings.decision.value_of)
-            n_constants = 0 if bodies is None else len(bodies.constants)
             self._errors = Errors(
                 settings.decision.errors, valued, rows, n_rules, n_constants, context.seed
             )
@@ -141,15 +144,15 @@ class Views:
                 own = self._errors.weights(agent, theta)
                 constants = self._errors.constants(agent)
                 if constants is not None:
-                    prediction = self._model.predict(seen, constants) or shared
+                    prediction = self._model.predict(seen, constants)
             views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
         return views
 
-    def decision_costs(self, inputs: FuzzyInputs, hierarchy: Hierarchy) -> Mapping[str, float]:
+    def decision_costs(self, agreement: float, hierarchy: Hierarchy) -> Mapping[str, float]:
         """Return agreement and communication of a decision by the names of `costs`."""
         share = len(self._members) / len(hierarchy)  # the other parts add their shares
         spent = {
-            "agreement": inputs.agreement * share,
+            "agreement": agreement * share,
             "received": float(sum(len(hierarchy.senders(i)) for i in self._members)),
             "broadcast": self._broadcast,
         }

@@ -81,7 +81,6 @@ class FunctionAgents(Agents[FunctionInputs]):
     """
 
     acts_in_parallel = True
-    sends_payload = True
 
     def __init__(self, settings: FunctionSettings, context: AgentContext) -> None:
         scenario = context.scenario
@@ -102,16 +101,17 @@ class FunctionAgents(Agents[FunctionInputs]):
         ]
         counted = [measure for measure in COUNTED if measure.name not in settings.costs]
         self.costs = (*counted, *reported)
-        self.reset(0)
+        self.reset(0, learn=False)
 
-    def reset(self, episode: int) -> None:
+    def reset(self, episode: int, *, learn: bool) -> None:
         """Start an episode."""
         self._episode = episode
-        self._step = 0
+        self._step = -1
 
     def observe(self, seen: Observation, *, explore: bool) -> FunctionInputs:
-        """Return the inputs of a decision."""
-        return FunctionInputs(seen.present)
+        """Advance to the next decision and return its inputs."""
+        self._step += 1
+        return FunctionInputs(seen.states)
 
     def act(self, inputs: FunctionInputs, inbox: Inbox) -> IntArray:
         """Return the actions ``(k,)`` of the agents of a stage.
@@ -205,7 +205,7 @@ class FunctionAgents(Agents[FunctionInputs]):
         replies = inputs.replies.items()
         return {agent: reply.message for agent, reply in replies if reply.message is not None}
 
-    def decision_costs(self, inputs: FunctionInputs) -> Mapping[str, float]:
+    def decision_costs(self, inputs: FunctionInputs, joint_action: IntArray) -> Mapping[str, float]:
         """Return the costs of all answers of a decision."""
         total = {measure.name: 0.0 for measure in self.costs}
         counts = (len(inputs.replies), inputs.message_bytes)
@@ -216,10 +216,6 @@ class FunctionAgents(Agents[FunctionInputs]):
             for name, value in reply.costs.items():
                 total[name] += value
         return total
-
-    def conclude(self, inputs: FunctionInputs, joint_action: IntArray) -> None:
-        """Advance to the next decision."""
-        self._step += 1
 
     def state_dict(self) -> StateDict:
         """Return the agents' indices; functions have no other state."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Generic, Self, TypeVar
+from typing import Any, Generic, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -80,68 +80,18 @@ class Agents(ABC, Generic[I]):
     """A part of a team: agents of one kind.
 
     Subclasses implement `observe`, `act`, `state_dict`, `load_state_dict` and `warm_start`. The
-    other members have defaults.
+    other members have defaults. Optional abilities are the protocols below; `Team` asks for them.
     """
 
     acts_in_parallel: bool = False
     """Whether all members of a stage decide in one call. Otherwise a stage is one member."""
-    is_vectorized: ClassVar[bool] = False
-    """Whether the agents can act and learn in many environments at once, ``(E, n, d)``."""
     is_stochastic: bool = False
     """Whether the policy is stochastic, so that sampled actions are evaluated, too."""
-    sends_payload: ClassVar[bool] = False
-    """Whether messages of the agents contain more than their actions, see `payloads`."""
     rng: np.random.Generator
     """Source of the random numbers of all decisions."""
-    costs: tuple[Measure, ...] = ()
-    """Measures of the costs of decisions, see `decision_costs`."""
 
-    @property
-    def counts(self) -> Counts:
-        """Number of evaluations so far, for agents that count them."""
-        return Counts()
-
-    @property
-    def weight_bytes(self) -> int:
-        """Memory of the learned weights [bytes]."""
-        return sum(array.nbytes for array in self.state_dict().values())
-
-    def check(self, observation: Observation) -> None:
-        """Refuse a scenario that lacks what the agents decide by.
-
-        Raises
-        ------
-        ValueError
-            One line.
-        """
-
-    def check_scenario(self, scenario: Scenario) -> None:
-        """Refuse another scenario in which the trained agents cannot act.
-
-        Raises
-        ------
-        ValueError
-            One line.
-        """
-
-    def reset(self, episode: int) -> None:
-        """Start an episode, of training or of evaluation."""
-
-    def begin_episode(self) -> None:
-        """Start an episode of training."""
-
-    def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
-        """Decide in a repaired hierarchy, because agents have left or joined the team.
-
-        Parameters
-        ----------
-        hierarchy
-            Repaired hierarchy; agents that have left have no edges.
-        left
-            ``(k,)`` agents that have left.
-        actions
-            ``(k,)`` their actions meanwhile, which all agents know.
-        """
+    def reset(self, episode: int, *, learn: bool) -> None:
+        """Start an episode, of training if the agents `learn`, else of evaluation."""
 
     @abstractmethod
     def observe(self, observation: Observation, *, explore: bool) -> I:
@@ -151,55 +101,8 @@ class Agents(ABC, Generic[I]):
     def act(self, inputs: I, inbox: Inbox) -> IntArray:
         """Return the actions ``(k,)`` of the agents of a stage, given the messages to them."""
 
-    def payloads(self, inputs: I) -> Mapping[int, object]:
-        """Return the payloads of the messages sent so far in this decision, by agent."""
-        return {}
-
-    def conclude(self, inputs: I, joint_action: IntArray) -> None:
-        """Receive the joint action before the step."""
-
-    def decision_costs(self, inputs: I) -> Mapping[str, float]:
-        """Return the costs of a decision by the names of `costs`."""
-        return {}
-
-    def record_values(self, inputs: I) -> None:
-        """Keep the values of actions in this decision, for `action_values`."""
-
-    def action_values(self, inputs: I) -> Mapping[int, FloatArray]:
-        """Return the recorded values ``(A,)`` of the actions of each member.
-
-        Policies return the log probabilities of actions; agents without values return nothing.
-        """
-        return {}
-
-    def value(self, agent: int, states: FloatArray) -> FloatArray:
-        """Return the value function of an agent at states ``(..., d)``.
-
-        Raises
-        ------
-        ValueError
-            If the agents have no value function of single states; one line.
-        """
-        raise ValueError(f"{type(self).__name__}: has no value function of an agent's states")
-
     def learn(self, experience: Experience, inputs: I) -> None:
         """Learn from a step; after the last step of an episode, also from the episode."""
-
-    def learn_batch(self, joint: IntArray, inputs: I, steps: Transitions, last: BoolArray) -> None:
-        """Learn from one step of many environments; for vectorized agents only.
-
-        Parameters
-        ----------
-        joint
-            ``(E, n)`` joint actions.
-        inputs
-            Inputs of the decision.
-        steps
-            Result of the step.
-        last
-            ``(E,)`` whether an episode ends with this step.
-        """
-        raise NotImplementedError(f"{type(self).__name__} learns in one environment")
 
     @abstractmethod
     def state_dict(self) -> StateDict:
@@ -223,4 +126,112 @@ class Agents(ABC, Generic[I]):
         ------
         ValueError
             If it cannot be used here; one line.
+        """
+
+
+@runtime_checkable
+class Vectorized(Protocol):
+    """Agents act and learn in many environments at once, with states ``(E, n, d)``."""
+
+    def learn_batch(
+        self, joint_actions: IntArray, inputs: Any, steps: Transitions, last: BoolArray
+    ) -> None:
+        """Learn from one step of many environments.
+
+        Parameters
+        ----------
+        joint_actions
+            ``(E, n)`` joint actions.
+        inputs
+            Inputs of the decision.
+        steps
+            Result of the step.
+        last
+            ``(E,)`` whether an episode ends with this step.
+        """
+
+
+@runtime_checkable
+class SendsPayloads(Protocol):
+    """Messages of the agents contain more than their actions."""
+
+    def payloads(self, inputs: Any) -> Mapping[int, object]:
+        """Return the payloads of the messages sent so far in this decision, by agent."""
+
+
+@runtime_checkable
+class ObservesJointActions(Protocol):
+    """Agents learn about each other by their actions, in training and in evaluation."""
+
+    def conclude(self, inputs: Any, joint_action: IntArray) -> None:
+        """Receive the joint action ``(n,)`` before the step."""
+
+
+@runtime_checkable
+class Rearrangeable(Protocol):
+    """Agents know who has left the team."""
+
+    def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
+        """Decide in a repaired hierarchy, because agents have left or joined the team.
+
+        Parameters
+        ----------
+        hierarchy
+            Repaired hierarchy; agents that have left have no edges.
+        left
+            ``(k,)`` agents that have left.
+        actions
+            ``(k,)`` their actions meanwhile, which all agents know.
+        """
+
+
+@runtime_checkable
+class ReportsCosts(Protocol):
+    """Decisions of the agents have costs, which become columns of results."""
+
+    costs: tuple[Measure, ...]
+    """Measures of the costs of decisions."""
+
+    def decision_costs(self, inputs: Any, joint_action: IntArray) -> Mapping[str, float]:
+        """Return the costs of a decision by the names of `costs`."""
+
+
+@runtime_checkable
+class ReportsResources(Protocol):
+    """Computation and memory of the agents are measured."""
+
+    @property
+    def counts(self) -> Counts:
+        """Number of evaluations so far."""
+
+    @property
+    def weight_bytes(self) -> int:
+        """Memory of the learned weights [bytes]."""
+
+
+@runtime_checkable
+class Inspectable(Protocol):
+    """The values by which the agents decide can be shown."""
+
+    def record_values(self, inputs: Any) -> None:
+        """Keep the values of actions in this decision, for `action_values`."""
+
+    def action_values(self, inputs: Any) -> Mapping[int, FloatArray]:
+        """Return the recorded values ``(A,)`` of the actions of each member.
+
+        Policies return the log probabilities of actions.
+        """
+
+
+@runtime_checkable
+class ValuesStates(Protocol):
+    """Agents have a value function of their states."""
+
+    def value(self, agent: int, states: FloatArray) -> FloatArray:
+        """Return the value function of an agent at states ``(..., d)``.
+
+        Raises
+        ------
+        ValueError
+            If the states have other variables; one line.
         """

@@ -10,34 +10,19 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..numerics import FloatArray, IntArray
-from .prediction import Prediction
-from .scenario import Scenario, Transition
+from .prediction import UNPREDICTED, Prediction
+from .scenario import Transition
 
 
 class Observation(NamedTuple):
-    """States of all agents when a decision begins."""
+    """States of all agents when a decision begins, and the prediction from these states."""
 
-    present: FloatArray
+    states: FloatArray
     """``(n, d)`` states of the agents."""
-    scenario: Scenario
-    """Scenario in these states, from which predictions start."""
+    prediction: Prediction = UNPREDICTED
+    """Prediction of the scenario, see `Team.observe`."""
     previous: IntArray | None = None
     """``(n,)`` previous joint action; None in the first decision of an episode."""
-    imagined: Prediction | None = None
-    """Prediction to use in place of the agents' own, for situations that are only imagined."""
-
-    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent` that the scenario predicts.
-
-        Raises
-        ------
-        ValueError
-            If the scenario predicts nothing.
-        """
-        prediction = self.imagined or self.scenario.predict()
-        if prediction is None:
-            raise ValueError(f"the scenario {type(self.scenario).__name__} predicts nothing")
-        return prediction.states(agent, joint_actions)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from .spaces import ActionSet, StateSpace
 
 
 class LeaderOptions(ABC):
-    """Options of the leader in one scenario, see `Scenario.options`."""
+    """Options of the leader in one scenario, see `abilities.Led`."""
 
     state_space: StateSpace
     """Variables of the leader."""

@@ -6,7 +6,7 @@ Arrays follow the conventions of `spaces`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -92,6 +92,10 @@ class Prediction(ABC):
     supported. `nested_agents.scenarios.checking` compares them with `states`.
     """
 
+    repeats: bool = False
+    """Whether agents are assumed to repeat their action in all decisions after the first. If not,
+    they take the neutral action. See `nested_agents.core.interface.abilities.PredictsAhead`."""
+
     @cached_property
     def alike(self) -> IntArray | None:
         """``(G, L)`` first robot-action index with the same result as each index; None if unknown.
@@ -139,7 +143,10 @@ class Unpredicted(Prediction):
         ValueError
             Always.
         """
-        raise ValueError("nothing is predicted here: the scenario has no method predict")
+        raise ValueError(
+            "nothing is predicted here: the scenario has no predictor, or needs_prediction of the "
+            "learner's settings is false"
+        )
 
 
 UNPREDICTED = Unpredicted()
@@ -160,11 +167,33 @@ def rewards_of(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
     return rewards
 
 
+class Assumptions(NamedTuple):
+    """What agents assume about bodies; where it is None, a prediction keeps its own assumption."""
+
+    effects: Sequence[FloatArray] | None = None
+    """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
+    constants: FloatArray | None = None
+    """``(c,)`` logarithms of factors on the nominal values of the constants."""
+    regressions: Sequence[FloatArray] | None = None
+    """Weights ``(f, t)`` of the regressions that predict poses, see
+    `Embodiment.regression_shapes`."""
+    decisions: int = 1
+    """Number of decisions for which regressions hold the wheel speeds after a joint action."""
+
+
 class EmbodiedPrediction(Prediction):
-    """A prediction for assumed effects of actuators, and possibly for assumed constants."""
+    """A prediction for assumed effects of actuators, and possibly for assumed constants.
+
+    Scenarios with such predictions describe their bodies, see
+    `nested_agents.core.interface.abilities.Embodiment`.
+    """
 
     groups: tuple[tuple[int, ...], ...]
     """Indices of the agents of every body."""
+
+    @abstractmethod
+    def assuming(self, assumptions: Assumptions) -> EmbodiedPrediction:
+        """Return the prediction from the same states under other assumptions."""
 
     @abstractmethod
     def commands(self, joint_action: IntArray) -> FloatArray:

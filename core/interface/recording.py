@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from ..numerics import FloatArray
-from .scenario import Scenario, Transition
+from .abilities import Animated, Recorded
+from .scenario import Transition
 
 
 class EpisodeRecorder:
@@ -18,10 +19,10 @@ class EpisodeRecorder:
         steps, in the same state.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Recorded) -> None:
         opening = scenario.measure()
         self._frames = {name: [np.array(opening[name])] for name in scenario.recorded}
-        constants = scenario.constants_of_episode()
+        constants = scenario.constants_of_episode() if isinstance(scenario, Animated) else {}
         self._constants = {name: np.array(value) for name, value in constants.items()}
         self._rewards: list[FloatArray] = []
 

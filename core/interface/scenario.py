@@ -1,32 +1,25 @@
 """Interface of scenarios, environments with a task, and the transitions that they return.
 
-Arrays follow the conventions of `spaces`. Scenarios inherit from `Scenario`. Classes of users that
-have its five required members need not, see `nested_agents.core.interface.plain`.
+Arrays follow the conventions of `spaces`. Scenarios inherit from `Scenario`, which has what every
+scenario needs. Optional abilities are protocols, see `nested_agents.core.interface.abilities`.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..numerics import BoolArray, FloatArray, IntArray
-from .environments import Environments
+from ..numerics import FloatArray, IntArray
 from .measures import Measure
-from .prediction import EmbodiedPrediction, Prediction
+from .prediction import UNPREDICTED, Prediction
 from .spaces import ActionSet, StateSpace
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from .options import LeaderOptions
 
 Twists = FloatArray | Callable[[], FloatArray | None] | None
 """Twists of a transition, a function that measures them, or None."""
@@ -121,56 +114,11 @@ def checked_reward(reward: object, agents: Sequence[str]) -> float | FloatArray:
     return array if array.ndim else array.item()
 
 
-class Embodiment(ABC):
-    """Bodies with actuators, for self-models, calibration and learned models of poses."""
-
-    nominal_effects: tuple[FloatArray, ...]
-    """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""
-    constants: tuple[str, ...] = ()
-    """Names of the positive constants of the predictor that can be calibrated."""
-    levers: FloatArray = np.zeros(0)
-    """``(K + M,)`` speed per turning rate of moved objects and of bodies [m], with constants
-    only."""
-    regression_shapes: tuple[tuple[int, int], ...] = ()
-    """Numbers of features and targets of the regressions that predict poses; empty if poses cannot
-    be learned."""
-
-    @abstractmethod
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> EmbodiedPrediction:
-        """Return the prediction from the present state for assumed effects and constants.
-
-        Constants are logarithms of factors on their nominal values.
-        """
-
-    def predict_poses(
-        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
-    ) -> EmbodiedPrediction:
-        """Return the prediction for assumed effects and the weights ``(f, t)`` of all regressions.
-
-        The wheel speeds after the first joint action are held for a number of decisions.
-        """
-        raise TypeError(f"{type(self).__name__} has no poses to learn")
-
-
-class PolicyMap(ABC):
-    """Actions of a team in many situations, for display."""
-
-    @abstractmethod
-    def lines(self) -> Iterator[str]:
-        """Yield lines of text."""
-
-    @abstractmethod
-    def figure(self) -> Figure:
-        """Return a figure."""
-
-
 class Scenario(ABC):
     """An environment with a task.
 
-    Required are `agents`, `state_space`, `action_set`, `reset` and `step`. All other members have
-    defaults.
+    Required are `agents`, `state_space`, `action_set`, `reset` and `step`. The other members have
+    defaults. Further abilities are the protocols of `nested_agents.core.interface.abilities`.
     """
 
     agents: tuple[str, ...]
@@ -182,18 +130,6 @@ class Scenario(ABC):
     measures: tuple[Measure, ...] = ()
     """Measures of an episode in addition to success, see `measures_of`. With `NO_SUCCESS`, returns
     are compared."""
-    interactions: Sequence[tuple[int, int]] | None = None
-    """Pairs of indices of interacting agents, the neighbors in a topology with ``shape =
-    "scenario"``."""
-    horizon: int = 1
-    """Number of decisions that a prediction covers. After the first decision it assumes that all
-    agents take the neutral action, or the same action again if `repeats` is true."""
-    repeats: bool = False
-    """Whether predictions assume that all agents repeat their first action."""
-    options: LeaderOptions | None = None
-    """Options of a leader above the agents; None without a leader."""
-    recorded: tuple[str, ...] = ()
-    """Names of the recorded measurements, one array ``(T + 1, ...)`` each."""
 
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -205,28 +141,11 @@ class Scenario(ABC):
         """Role of every agent, by default its name. Agents of one role can share weights."""
         return tuple(self.agents)
 
-    @cached_property
-    def perceived(self) -> BoolArray:
-        """``(n, G)`` whether an agent perceives the state of another body; by default all do."""
-        own = np.zeros((len(self.agents), len(self.groups)), dtype=bool)
-        for body, group in enumerate(self.groups):
-            own[list(group), body] = True
-        return ~own
-
-    @property
-    def is_private(self) -> bool:
-        """Whether every agent has sensors of its own, see `Prediction.of`."""
-        return False
-
-    @cached_property
-    def bounds(self) -> FloatArray:
-        """``(d, 2)`` lower and upper bounds of the states."""
-        return self.state_space.bounds
-
     @property
     def lacks_prediction(self) -> str:
-        """Reason why a scenario has no prediction."""
-        return f"the scenario {type(self).__name__} has no method predict"
+        """Reason why `predict` returns no prediction; empty if it returns one."""
+        is_missing = type(self).predict is Scenario.predict
+        return f"the scenario {type(self).__name__} has no method predict" if is_missing else ""
 
     @abstractmethod
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
@@ -239,83 +158,77 @@ class Scenario(ABC):
     def step(self, joint_action: IntArray) -> Transition:
         """Execute a joint action ``(n,)`` for one decision period."""
 
-    def environments(self, count: int) -> Environments | None:
-        """Return `count` environments that step in one call, or None if this is not supported."""
-        return None
-
-    @property
-    def predicts(self) -> bool:
-        """Whether `predict` returns a prediction."""
-        return type(self).predict is not Scenario.predict
-
     def predict(self) -> Prediction | None:
         """Return the prediction from the present state, or None without a predictor."""
         return None
 
-    def with_exact_prediction(self) -> Scenario | None:
-        """Return the scenario with a predictor that is exact up to rounding, or None.
 
-        Tests use it to compare predicted with sensed states. A scenario that predicts exactly
-        returns itself.
-        """
-        return None
+class ScenarioWrapper(Scenario):
+    """A scenario with the agents of another one, of which it changes a part.
 
-    def partners(self) -> Sequence[int] | None:
-        """Return the index of every agent's mirror image, or None without mirror symmetry.
+    The other abilities of the wrapped scenario are found by `unwrapped`.
 
-        Raises
-        ------
-        ValueError
-            If an agent has no mirror image; one line.
-        """
-        return None
+    Parameters
+    ----------
+    scenario
+        The wrapped scenario.
+    """
 
-    def embodiment(self) -> Embodiment | None:
-        """Return the bodies for self-models and calibration, or None."""
-        return None
-
-    def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state, as in `Transition.info`.
-
-        Recordings call it before the first step, for the measurements in `recorded`.
-        """
-        return {}
-
-    def constants_of_episode(self) -> Mapping[str, Any]:
-        """Return recorded constants of the episode: numbers, texts, arrays."""
-        return {}
-
-    def show_policy(
-        self,
-        choose: Callable[[Prediction], IntArray],
-        predict: Callable[[], Prediction | None],
-    ) -> PolicyMap | None:
-        """Return the actions of a team in many situations, or None if this is not supported.
-
-        The scenario starts another episode.
-
-        Parameters
-        ----------
-        choose
-            Returns the joint action ``(n,)`` that the team chooses by a prediction.
-        predict
-            Returns the team's prediction from the present state of the scenario.
-
-        Raises
-        ------
-        ValueError
-            If predictions cannot start in arbitrary states; one line.
-        """
-        return None
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.agents = tuple(scenario.agents)
+        self.state_space = scenario.state_space
+        self.action_set = scenario.action_set
+        self.measures = scenario.measures
+        self.groups = scenario.groups
+        self.roles = scenario.roles
 
     @property
-    def draws(self) -> bool:
-        """Whether recordings can be animated."""
-        return bool(self.recorded) and type(self).animate is not Scenario.animate
+    def lacks_prediction(self) -> str:
+        """Reason why the wrapped scenario has no prediction."""
+        return self.scenario.lacks_prediction
 
-    def animate(self, recording: Mapping[str, Any], path: Path) -> None:
-        """Write a recording, arrays by name, as GIF or MP4 according to the suffix of `path`."""
-        raise ValueError(f"the scenario {type(self).__name__} draws no recordings")
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode."""
+        return self.scenario.reset(seed, episode)
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Execute a joint action."""
+        return self.scenario.step(joint_action)
+
+    def predict(self) -> Prediction | None:
+        """Return the prediction of the wrapped scenario."""
+        return self.scenario.predict()
+
+
+def unwrapped(scenario: Scenario) -> Scenario:
+    """Return a scenario without wrappers, to ask for the abilities that wrappers do not change."""
+    while isinstance(scenario, ScenarioWrapper):
+        scenario = scenario.scenario
+    return scenario
+
+
+def prediction_of(scenario: Scenario) -> Prediction:
+    """Return the prediction from the present state; `UNPREDICTED` without a predictor.
+
+    Raises
+    ------
+    ValueError
+        If the scenario returns something else than a prediction or None; one line.
+    """
+    prediction: object = scenario.predict()
+    if prediction is None:
+        return UNPREDICTED
+    if isinstance(prediction, Prediction):
+        return prediction
+    raise ValueError(
+        f"scenario.predict() returned {type(prediction).__name__}, allowed: None or an instance of "
+        "nested_agents.Prediction"
+    )
+
+
+REQUIRED_WITH = {"recorded": "measure", "animate": "constants_of_episode"}
+"""Members of optional abilities, and the members without which they have no effect."""
 
 
 def checked_scenario(thing: object) -> Scenario:
@@ -324,7 +237,7 @@ def checked_scenario(thing: object) -> Scenario:
     Raises
     ------
     ValueError
-        If it is no `Scenario`, or lacks a necessary attribute; one line.
+        If it is no `Scenario`, or lacks a necessary attribute or a part of an ability; one line.
     """
     name = type(thing).__name__
     if not isinstance(thing, Scenario):
@@ -336,7 +249,20 @@ def checked_scenario(thing: object) -> Scenario:
     missing = [key for key in ("agents", "state_space", "action_set") if not hasattr(thing, key)]
     if missing:
         raise ValueError(f"scenario.kind: {name} lacks {', '.join(missing)}")
+    for member, needed in REQUIRED_WITH.items():
+        if hasattr(thing, member) and not hasattr(thing, needed):
+            raise ValueError(f"scenario.kind: {name} has {member}, and lacks {needed}")
     return thing
+
+
+def has_same_agents(scenario: Scenario, other: Scenario) -> bool:
+    """Return whether agents of one scenario can act in another one as they are."""
+    return (
+        tuple(scenario.agents) == tuple(other.agents)
+        and scenario.roles == other.roles
+        and scenario.state_space == other.state_space
+        and scenario.action_set == other.action_set
+    )
 
 
 class Members(NamedTuple):

@@ -15,7 +15,7 @@ digits of one group read as a number are its *robot-action index*.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from numbers import Real
 from typing import Literal
 
@@ -77,6 +77,8 @@ class Variable:
     mirrored: Literal["same", "opposite"] | None = None
     """Sign in the mirror image of the environment: the ``same`` or ``opposite``; None if unknown.
     See `core.models.predictors`."""
+    bounds: tuple[float, float] = field(default=(-inf, inf), compare=False)
+    """Values that are possible at all; `check_scenario` refuses others."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
@@ -189,9 +191,8 @@ class StateSpace:
 
     @property
     def bounds(self) -> FloatArray:
-        """``(d, 2)`` bounds of the states: the period of periodic variables, else infinite."""
-        any_ = (-np.inf, np.inf)
-        return np.array([(v.low, v.high) if v.periodic else any_ for v in self.variables])
+        """``(d, 2)`` bounds of the states: the period of periodic variables, else `bounds`."""
+        return np.array([(v.low, v.high) if v.periodic else v.bounds for v in self.variables])
 
     @property
     def n_variables(self) -> int:

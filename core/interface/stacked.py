@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
+from .abilities import Batched
 from .environments import Environments, Transitions
 from .scenario import Scenario, checked_transition
 
@@ -51,6 +52,23 @@ class StackedEnvironments(Environments, Generic[S]):
             states.append(self.scenario.reset(seed, first_episode + k))
             self.store(index, self.scenario)
         return np.stack(states)
+
+
+def make_environments(make: Callable[[], Scenario], count: int) -> Environments:
+    """Return `count` environments, which step in one call if their scenario supports this.
+
+    Parameters
+    ----------
+    make
+        Returns a scenario; the scenarios have equal settings.
+    count
+        Number of environments.
+    """
+    first = make()
+    environments = first.environments(count) if isinstance(first, Batched) else None
+    if environments is None:
+        return LoopedEnvironments([first, *(make() for _ in range(count - 1))])
+    return environments
 
 
 class LoopedEnvironments(Environments):

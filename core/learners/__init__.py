@@ -45,9 +45,9 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     ValueError
         If there is no predictor; the message names the learners that need none.
     """
-    if not settings.needs_prediction or scenario.predicts:
-        return
     lack = scenario.lacks_prediction
+    if not settings.needs_prediction or not lack:
+        return
     kinds = [k for k in LEARNERS.built_in if k != "mixed"]
     others = [k for k in kinds if not LEARNERS.parsed(k).needs_prediction]
     raise ValueError(

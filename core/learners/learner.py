@@ -15,7 +15,7 @@ from ..interface.agents import AgentContext, Agents
 from ..interface.scenario import Scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..models.calibration import CalibrationSettings
-from ..models.predictors import GivenPredictor, Predictor
+from ..models.predictors import GivenPredictor, PosePredictorSettings, Predictor
 from ..models.self_model import SelfModelSettings
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
@@ -242,5 +242,8 @@ class LearnerSettings(TeamSettings):
     @property
     def needs_prediction(self) -> bool:
         """Whether it requires a scenario with a predictor; a learned predictor replaces it."""
-        is_given = isinstance(self.predictor, GivenPredictor)
-        return is_given and self.decision.rule != "random" and not self.values_actions
+        if isinstance(self.predictor, PosePredictorSettings):
+            return True
+        adapts = self.self_model.enabled or self.calibration.enabled
+        decides = self.decision.rule != "random" and not self.values_actions
+        return isinstance(self.predictor, GivenPredictor) and (adapts or decides)

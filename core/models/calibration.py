@@ -20,6 +20,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..interface.abilities import Embodiment
 from ..interface.prediction import EmbodiedPrediction
 from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
@@ -86,13 +87,12 @@ class Calibration(Adaptive[EmbodiedPrediction]):
         """
         if not settings.enabled:
             return None
-        bodies = scenario.embodiment()
-        if bodies is None or not bodies.constants:
+        if not isinstance(scenario, Embodiment) or not scenario.constants:
             raise ValueError(
                 "learner.calibration.enabled: the scenario's predictor has no constants to "
                 "calibrate"
             )
-        return cls(settings, len(bodies.constants), bodies.levers)
+        return cls(settings, len(scenario.constants), scenario.levers)
 
     def adapt(
         self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition

@@ -20,6 +20,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..interface.abilities import horizon_of, partners_of
 from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..values.partitions import Partition
@@ -70,7 +71,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
             raise ValueError(
                 "learner.predictor: the scenario has no shared variables to predict; use 'given'"
             )
-        self.horizon = settings.horizon or scenario.horizon
+        self.horizon = settings.horizon or horizon_of(scenario)
         if settings.mirrored and not space.n_own:
             raise ValueError(
                 "learner.predictor.mirrored = true: needs own state variables; use false"
@@ -78,7 +79,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         mirrored = settings.mirrored
         if mirrored is None:
             # The mirror image of an action is unknown, that of an own variable is known.
-            mirrored = space.n_own > 0 and scenario.partners() is not None
+            mirrored = space.n_own > 0 and partners_of(scenario) is not None
         self.mirror = Mirror.of(scenario) if mirrored else None
         self.bodies = DrivenBodies(
             scenario, products=settings.products, memberships=settings.memberships

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..interface.abilities import Embodiment
 from ..interface.prediction import EmbodiedPrediction
 from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
@@ -20,7 +21,7 @@ from .predictors import PosePredictorSettings
 
 
 class PoseModel(Adaptive[EmbodiedPrediction]):
-    """Weights with which bodies predict their poses, see `Embodiment.predict_poses`.
+    """Weights with which bodies predict their poses, see `Assumptions.regressions`.
 
     Parameters
     ----------
@@ -36,18 +37,17 @@ class PoseModel(Adaptive[EmbodiedPrediction]):
     """
 
     def __init__(self, settings: PosePredictorSettings, scenario: Scenario) -> None:
-        bodies = scenario.embodiment()
-        if bodies is None or not bodies.regression_shapes:
+        if not isinstance(scenario, Embodiment) or not scenario.regression_shapes:
             raise ValueError(
                 "learner.predictor.kind = 'poses': the scenario has no bodies with poses; use "
                 "'given', 'learned' or 'static'"
             )
         self.horizon = settings.horizon
         self._ridge = settings.ridge
-        self._levers = bodies.levers
+        self._levers = scenario.levers
         self.memory: dict[str, FloatArray] = {"decisions": np.zeros(1)}
         """Sums over all experience, and the weights computed from them."""
-        for i, (f, t) in enumerate(bodies.regression_shapes):
+        for i, (f, t) in enumerate(scenario.regression_shapes):
             self.memory[f"gram{i}"] = np.zeros((f, f))
             self.memory[f"moment{i}"] = np.zeros((f, t))
             self.memory[f"weights{i}"] = np.zeros((f, t))

@@ -20,6 +20,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from ..interface.abilities import partners_of
 from ..interface.prediction import Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray, IntArray, njit
@@ -143,7 +144,7 @@ class Mirror:
         ValueError
             If it has none, or a state variable does not declare its mirror image.
         """
-        partners = scenario.partners()
+        partners = partners_of(scenario)
         if partners is None:
             raise ValueError("learner.mirrored: the scenario declares no mirror symmetry")
         variables = scenario.state_space.variables

@@ -21,6 +21,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..interface.abilities import Embodiment
 from ..interface.prediction import EmbodiedPrediction
 from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
@@ -109,10 +110,9 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         """
         if not settings.enabled:
             return None
-        bodies = scenario.embodiment()
-        if bodies is None:
+        if not isinstance(scenario, Embodiment):
             raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
-        return cls(settings, bodies.nominal_effects)
+        return cls(settings, scenario.nominal_effects)
 
     def adapt(
         self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition

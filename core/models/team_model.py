@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..interface.experience import Experience, Observation
-from ..interface.prediction import Prediction
+from ..interface.prediction import Assumptions, EmbodiedPrediction, Prediction
 from ..interface.scenario import Scenario
 from ..numerics import FloatArray
 from ..plugins.settings import PartSettings
@@ -75,8 +75,8 @@ class TeamModel:
             name: part for name, part in parts.items() if isinstance(part, Adaptive)
         }
 
-    def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction | None:
-        """Return the prediction from the present states; None if the scenario predicts nothing.
+    def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction:
+        """Return the prediction from the present states.
 
         Parameters
         ----------
@@ -85,27 +85,27 @@ class TeamModel:
         errors
             ``(c,)`` errors of the logarithms of the predictor's constants, or None.
         """
-        if seen.imagined is not None:
-            return seen.imagined
         if isinstance(self.predictor, DynamicsModel):
-            return self.predictor.predict(seen.present)
+            return self.predictor.predict(seen.states)
         parts = (self.predictor, self.self_model, self.calibration, errors)
         if all(part is None for part in parts):
-            return _checked(seen.scenario.predict())
-        bodies = seen.scenario.embodiment()
-        if bodies is None:
+            return seen.prediction
+        if not isinstance(seen.prediction, EmbodiedPrediction):
             raise ValueError(
                 "learner.self_model, calibration, decision.errors: the scenario has no bodies"
             )
-        effects = bodies.nominal_effects if self.self_model is None else self.self_model.effects
+        assumed = Assumptions(effects=None if self.self_model is None else self.self_model.effects)
         if self.predictor is not None:
-            return bodies.predict_poses(effects, self.predictor.weights, self.predictor.horizon)
-        constants = None if self.calibration is None else self.calibration.constants
-        if errors is not None:
-            constants = errors if constants is None else constants + errors
-        return bodies.predict_with(effects, constants)
+            weights, horizon = self.predictor.weights, self.predictor.horizon
+            assumed = assumed._replace(regressions=weights, decisions=horizon)
+        else:
+            constants = None if self.calibration is None else self.calibration.constants
+            if errors is not None:
+                constants = errors if constants is None else constants + errors
+            assumed = assumed._replace(constants=constants)
+        return seen.prediction.assuming(assumed)
 
-    def learn(self, experience: Experience, prediction: Prediction | None) -> None:
+    def learn(self, experience: Experience, prediction: Prediction) -> None:
         """Adapt the models by the outcome of a decision."""
         joint_action = experience.decision.joint_action
         for part in self.adaptive.values():
@@ -120,13 +120,3 @@ class TeamModel:
         """Start from the models of another team."""
         for name in self.adaptive.keys() & former.adaptive.keys():
             self.adaptive[name].warm_start(former.adaptive[name])
-
-
-def _checked(prediction: object) -> Prediction | None:
-    """Return what a scenario predicts; refuse what is no prediction."""
-    if prediction is None or isinstance(prediction, Prediction):
-        return prediction
-    raise ValueError(
-        f"scenario.predict() returned {type(prediction).__name__}, allowed: None or an instance of "
-        "nested_agents.Prediction"
-    )

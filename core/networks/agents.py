@@ -66,7 +66,6 @@ class PPOAgents(Agents[PolicyInputs]):
     """
 
     is_stochastic = True
-    is_vectorized = True
 
     def __init__(
         self, settings: MultiAgentPPOSettings | PPOSettings, context: AgentContext
@@ -157,7 +156,7 @@ class PPOAgents(Agents[PolicyInputs]):
 
     def observe(self, seen: Observation, *, explore: bool) -> PolicyInputs:
         """Return the inputs of a decision, with noise if the agents explore."""
-        states = seen.present
+        states = seen.states
         own, joint = self._encode(states.reshape(-1, *states.shape[-2:]))
         n_told = len(self.told_names)
         actor = np.zeros((*own.shape[:2], n_told + own.shape[2]), np.float32)
@@ -192,6 +191,9 @@ class PPOAgents(Agents[PolicyInputs]):
         chosen: IntArray = (logits + inputs.noise[:, inbox.agents]).argmax(axis=2)
         return chosen.reshape(*inputs.batch_shape, -1)
 
+    def record_values(self, inputs: PolicyInputs) -> None:
+        """Do nothing, because inputs always contain the logits."""
+
     def action_values(self, inputs: PolicyInputs) -> Mapping[int, FloatArray]:
         """Return the log probabilities ``(A,)`` of the actions of each member."""
         log_probs = inputs.logits[0] - log_sum_exp(inputs.logits[0])[:, None]
@@ -211,7 +213,7 @@ class PPOAgents(Agents[PolicyInputs]):
         self.learn_batch(joint_actions, inputs, transitions, np.array([experience.last]))
 
     def learn_batch(
-        self, joint: IntArray, inputs: PolicyInputs, steps: Transitions, last: BoolArray
+        self, joint_actions: IntArray, inputs: PolicyInputs, steps: Transitions, last: BoolArray
     ) -> None:
         """Append a step of all environments, and update the policies when rollouts are full."""
         rewards = steps.rewards
@@ -219,7 +221,7 @@ class PPOAgents(Agents[PolicyInputs]):
             rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
         for name, policy in self.policies.items():
             rows = self._rows[name]
-            logits, actions = self._by_head(inputs.logits, joint, rows)
+            logits, actions = self._by_head(inputs.logits, joint_actions, rows)
             own = inputs.actor[:, rows]
             policy.append((own, inputs.joint), logits, actions, rewards[:, rows], last)
         truncated = last & ~steps.terminated
@@ -238,7 +240,7 @@ class PPOAgents(Agents[PolicyInputs]):
         """Return logits ``(E, k, h, A)`` and actions ``(E, k, h)`` of the rows of a policy."""
         return logits[:, rows, None], joint[:, rows, None]
 
-    def check_scenario(self, scenario: Scenario) -> None:
+    def _check(self, scenario: Scenario) -> None:
         """Refuse a scenario with other states or actions."""
         if scenario.state_space != self.scenario.state_space:
             raise ValueError(f"{self._trained(scenario)}: the state spaces differ")
@@ -259,7 +261,7 @@ class PPOAgents(Agents[PolicyInputs]):
         ValueError
             If states, actions, or the owners of weights differ; one line.
         """
-        former.check_scenario(self.scenario)
+        former._check(self.scenario)
         if self.policies.keys() != former.policies.keys():
             raise ValueError(
                 f"{former._trained(self.scenario)}: learner.weights = {self.settings.weights!r}; "
@@ -333,9 +335,9 @@ class CentralPPOAgents(PPOAgents):
         """Return logits ``(E, 1, h, A)`` and actions ``(E, 1, h)``."""
         return logits[:, None, self.members], joint[:, None, self.members]
 
-    def check_scenario(self, scenario: Scenario) -> None:
+    def _check(self, scenario: Scenario) -> None:
         """Refuse a scenario with other states, actions or agents."""
-        super().check_scenario(scenario)
+        super()._check(scenario)
         if tuple(scenario.agents) != tuple(self.scenario.agents):
             raise ValueError(f"{self._trained(scenario)}: one policy acts for all of them")
 

@@ -41,9 +41,6 @@ class StateReader:
         The state variables.
     common
         Names of the variables that are the same for all bodies.
-    bounds
-        ``(d, 2)`` bounds of the variables according to the spaces. They are infinite where the
-        spaces have none, and where the settings give a range.
 
     Raises
     ------
@@ -79,7 +76,6 @@ class StateReader:
         if not self.variables:
             raise ValueError("observation: all of its numbers are constant in random episodes")
         kept = [self._places[name] for name in names]
-        self.bounds: FloatArray = np.array([self._bounds_of(name) for name in names])
         is_common = [bool((rows == rows[:, :1]).all()) for rows in kept]
         is_single = len(spaces) == 1
         pairs = zip(names, is_common, strict=True)
@@ -150,7 +146,7 @@ class StateReader:
             is_discrete = all(isinstance(own.space, Discrete) for own in self._entries)
             if is_discrete and not centers and high - low < MAX_CENTRES:
                 centers = tuple(np.arange(low, high + 1.0).tolist())
-            return Variable(name, "1", low, high, centers=centers)
+            return Variable(name, "1", low, high, centers=centers, bounds=self._bounds_of(name))
         if settings.variables:
             raise ValueError(
                 f"scenario.variables.{name}: has no bounds and is always {low:g} in random "
@@ -166,8 +162,7 @@ class StateReader:
         return float(low), float(high)
 
     def _bounds_of(self, name: str) -> tuple[float, float]:
-        if name in self._settings.angles:
-            return -np.pi, np.pi
+        """Return the bounds by the spaces; infinite if the settings give a range."""
         if name in self._settings.ranges:
             return -np.inf, np.inf
         low, high = self._range(self._bounds, name)

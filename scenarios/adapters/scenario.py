@@ -71,7 +71,6 @@ class EnvironmentScenario(Scenario):
     """
 
     recorded = ("joint_action",)
-    repeats = True
 
     def __init__(self, settings: EnvironmentSettings, make: Maker | None = None) -> None:
         self._make = find_maker(settings) if make is None else make
@@ -87,7 +86,6 @@ class EnvironmentScenario(Scenario):
         self.state_space = StateSpace(
             "observed", self._reader.variables, common=self._reader.common
         )
-        self.bounds = self._reader.bounds
         self.horizon = settings.horizon
         self._start(0)
         self._states: FloatArray = np.zeros((len(self.agents), self.state_space.n_variables))
@@ -99,14 +97,14 @@ class EnvironmentScenario(Scenario):
         self._joint_action: IntArray = np.full(len(self.agents), self.action_set.neutral)
 
     @property
-    def predicts(self) -> bool:
-        """Whether copies of the simulator predict."""
-        return self.settings.predictor == "copy"
-
-    @property
     def lacks_prediction(self) -> str:
-        """Reason why there is no prediction."""
-        return f"scenario.predictor = {self.settings.predictor!r} gives none ('copy' does)"
+        """Reason why there is no prediction; empty if copies of the simulator predict."""
+        predictor = self.settings.predictor
+        return (
+            ""
+            if predictor == "copy"
+            else f"scenario.predictor = {predictor!r} gives none ('copy' does)"
+        )
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode and return the states ``(n, d)``."""
@@ -160,11 +158,11 @@ class EnvironmentScenario(Scenario):
 
     def predict(self) -> CopyPrediction | None:
         """Return a prediction by copies of the simulator, if the settings ask for one."""
-        return CopyPrediction(self, self._simulator) if self.predicts else None
+        return None if self.lacks_prediction else CopyPrediction(self, self._simulator)
 
     def with_exact_prediction(self) -> EnvironmentScenario | None:
         """Return the scenario with predictions of one decision, if copies predict."""
-        if not self.predicts:
+        if self.lacks_prediction:
             return None
         exact = copy(self)
         exact.horizon = 1
@@ -185,15 +183,9 @@ class EnvironmentScenario(Scenario):
                 return False
         return bool(success)
 
-    @property
-    def draws(self) -> bool:
-        """Whether the environment renders pictures."""
-        return "rgb_array" in (self._simulator.env.metadata or {}).get("render_modes", ())
-
     def draw(self, path: Path | str) -> None:
         """Draw the start of the episode, as the environment renders it, to a picture file."""
-        if not self.draws:
-            raise ValueError(f"{self.settings.id}: renders no pictures")
+        self._check_rendering()
         simulator = self._make(self.settings, "rgb_array")
         simulator.reset(self._seed)
         figure = Figure(layout="constrained")
@@ -204,6 +196,7 @@ class EnvironmentScenario(Scenario):
 
     def animate(self, recording: Mapping[str, Any], path: Path) -> None:
         """Replay a recorded episode and write it as an animation."""
+        self._check_rendering()
         try:
             simulator = self._make(self.settings, "rgb_array")
             simulator.reset(int(recording["seed"]))
@@ -216,9 +209,16 @@ class EnvironmentScenario(Scenario):
         fps = float(simulator.env.metadata.get("render_fps", DEFAULT_FPS))
         film(frames.__getitem__, len(frames) - 1, self.settings.hold / fps, path)
 
+    def _check_rendering(self) -> None:
+        """Refuse to draw an environment that renders no pictures."""
+        if "rgb_array" not in (self._simulator.env.metadata or {}).get("render_modes", ()):
+            raise ValueError(f"{self.settings.id}: renders no pictures")
+
 
 class CopyPrediction(Prediction):
     """Predicts by stepping copies of a simulator, once for each joint action."""
+
+    repeats = True
 
     def __init__(self, scenario: EnvironmentScenario, simulator: Simulator) -> None:
         self._scenario = scenario

@@ -6,8 +6,7 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -17,15 +16,15 @@ import numpy as np
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import Measure
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import Embodiment, Scenario, Transition
+from ...core.interface.recording import EpisodeRecorder
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
 from .measurements import MEASURES
-from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap, model_of
-from .prediction.models import LearnedPush
+from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap
 from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, Future, push_model
@@ -49,7 +48,7 @@ SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
 
 
-class BoxPushing(Scenario, Embodiment):
+class BoxPushing(Scenario):
     """Box pushing: the agents are the wheels of robots, which push a box to a goal.
 
     It can be drawn, calibrated and predicted exactly.
@@ -77,7 +76,7 @@ class BoxPushing(Scenario, Embodiment):
     has_leader: ClassVar[bool] = False
     """Whether there is a leader above the agents, see `leading`."""
     regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
-    recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
+    recorded: tuple[str, ...] = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
     def __init__(self, settings: BoxPushingSettings) -> None:
         expect("settings of box pushing", BoxPushingSettings, settings=settings)
@@ -228,44 +227,21 @@ class BoxPushing(Scenario, Embodiment):
             return None
         return BoxEnvironments(self, count)
 
-    def embodiment(self) -> Embodiment:
-        """Return itself: self-models can be learned for its robots."""
-        return self
-
     def predict(self) -> BoxPrediction:
         """Predict from the current state; all robots are assumed to be nominal."""
-        return self.predict_with(self.nominal_effects)
-
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> BoxPrediction:
-        """Predict with the given effects of the wheels and constants of the push."""
-        situation = self._present_state(effects)
-        model = self._model if constants is None else model_of(self._belief, constants)
-        if self._playground is None or self._saved is None:
-            return BoxPrediction(situation, model, self._prediction)
-        future = Future(
-            self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
-        )
-        return ExactPrediction(situation, model, self._prediction, future)
-
-    def predict_poses(
-        self, effects: Sequence[FloatArray], weights: Sequence[FloatArray], decisions: int
-    ) -> BoxPrediction:
-        """Predict by learned pushing, see `box_pushing.prediction.poses`."""
-        model = self._model._replace(learned=LearnedPush(self._period, *weights))
-        settings = replace(self._prediction, horizon=decisions * self._period)
-        return BoxPrediction(self._present_state(effects), model, settings)
-
-    def _present_state(self, effects: Sequence[FloatArray]) -> PresentState:
-        """Return the current state, with the given effects of the wheels."""
-        return PresentState(
+        situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),
             self.aim,
             self.commanded_speeds,
-            tuple(effects),
+            self.nominal_effects,
         )
+        if self._playground is None or self._saved is None:
+            return BoxPrediction(situation, self._model, self._prediction)
+        future = Future(
+            self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
+        )
+        return ExactPrediction(situation, self._model, self._prediction, future)
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""
@@ -287,15 +263,12 @@ class BoxPushing(Scenario, Embodiment):
         """Draw the current state, after `reset` the start of an episode, to a picture file."""
         from .pictures.rendering import snapshot
 
-        state = dict(self.measure())
-        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
-        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
-        snapshot(recording | constants, 0, path)
+        snapshot(EpisodeRecorder(self).recording(), 0, path)
 
     def show_policy(
         self,
         choose: Callable[[Prediction], IntArray],
-        predict: Callable[[], Prediction | None],
+        predict: Callable[[], Prediction],
     ) -> BoxPolicyMap:
         """Return the policy map of a team; the scenario is reset.
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core.interface.abilities import horizon_of
 from ...core.plugins.words import expect, expect_each, show
 from . import checks
 from .episodes import CheckPlan
@@ -135,7 +136,7 @@ def check_scenario(
     scenario = plan.make()
     actions = plan.actions(scenario, seeds[0])
     played = [
-        predicted_steps(scenario, seed, episode, actions, scenario.horizon)
+        predicted_steps(scenario, seed, episode, actions, horizon_of(scenario))
         for seed, episode in plan.runs
     ]
     passed = tuple(name for name in CHECKS if name not in plan.skipped)

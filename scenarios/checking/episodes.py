@@ -7,6 +7,7 @@ from itertools import product, zip_longest
 import numpy as np
 
 from ...core.agents.loop import world_seed
+from ...core.interface.abilities import measurements_of
 from ...core.interface.scenario import Scenario, Transition, checked_scenario
 from ...core.numerics import IntArray
 
@@ -85,7 +86,7 @@ class CheckPlan:
 def start(scenario: Scenario, seed: int, episode: int) -> StepRecord:
     """Reset a scenario and return the record of its initial state."""
     states = scenario.reset(world_seed(seed, episode), episode)
-    return _copied(_flat({"states": states, "info": scenario.measure()}))
+    return _copied(_flat({"states": states, "info": measurements_of(scenario)}))
 
 
 def transition_fields(transition: Transition) -> Iterator[tuple[str, object]]:
@@ -96,7 +97,7 @@ def transition_fields(transition: Transition) -> Iterator[tuple[str, object]]:
 
 def ask_for_predictions(scenario: Scenario) -> None:
     """Ask a scenario for measurements and for predictions of two joint actions."""
-    scenario.measure()
+    measurements_of(scenario)
     prediction = scenario.predict()
     if prediction is None:
         return
@@ -105,7 +106,7 @@ def ask_for_predictions(scenario: Scenario) -> None:
     for agent in range(n):
         prediction.states(agent, joint_actions)
     prediction.rewards(joint_actions)
-    scenario.measure()
+    measurements_of(scenario)
 
 
 def differences(

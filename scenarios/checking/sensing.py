@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.agents.loop import world_seed
+from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario
 from ...core.numerics import FloatArray, IntArray
 from .episodes import when
@@ -59,7 +60,7 @@ def predicted_steps(
         ``(steps, n)``; the episode may end earlier.
     ahead
         Number of decisions that predictions look ahead. After each joint action the agents take the
-        neutral action, or repeat theirs in a scenario that ``repeats``.
+        neutral action, or repeat theirs if the prediction ``repeats``.
     """
     steps = []
     reward = 0.0
@@ -67,8 +68,9 @@ def predicted_steps(
     states = np.array(scenario.reset(world_seed(seed, episode), episode))
     for action in joint_actions:
         before = _with_reward(states, reward)
-        predicted = _predicted(scenario, action, before)
-        following = action if scenario.repeats else neutral
+        prediction = scenario.predict()
+        predicted = _predicted(prediction, action, before)
+        following = action if prediction is not None and prediction.repeats else neutral
         for joint in [action, *[following] * (ahead - 1)]:
             transition = scenario.step(joint)
             states = np.array(transition.states)
@@ -81,9 +83,10 @@ def predicted_steps(
     return np.array(steps)
 
 
-def _predicted(scenario: Scenario, joint_action: IntArray, before: FloatArray) -> FloatArray:
+def _predicted(
+    prediction: Prediction | None, joint_action: IntArray, before: FloatArray
+) -> FloatArray:
     """Return the predicted states and reward of a joint action; NaN if they are not predicted."""
-    prediction = scenario.predict()
     if prediction is None:
         return np.full_like(before, np.nan)
     action = joint_action[None]

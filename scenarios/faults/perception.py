@@ -12,17 +12,14 @@ bodies that it does not perceive take the neutral action. Agents also learn from
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from ...core.interface.abilities import interactions_of
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import Scenario, Transition
-from ...core.interface.spaces import StateSpace
+from ...core.interface.scenario import Scenario, ScenarioWrapper, Transition
 from ...core.numerics import BoolArray, FloatArray, IntArray, nx, stream_of
 from ...core.plugins.settings import PerceptionSettings, mask_of
 
@@ -41,7 +38,7 @@ def perceived(scenario: Scenario, settings: Sequence[PerceptionSettings]) -> Sce
     return PerceivedScenario(scenario, settings) if settings else scenario
 
 
-class PerceivedScenario(Scenario):
+class PerceivedScenario(ScenarioWrapper):
     """A scenario that each agent perceives with its own sensors.
 
     Parameters
@@ -65,18 +62,8 @@ class PerceivedScenario(Scenario):
     (True, False)
     """
 
-    is_private = True
-
     def __init__(self, scenario: Scenario, settings: Sequence[PerceptionSettings]) -> None:
-        self.scenario = scenario
-        self.agents = tuple(scenario.agents)
-        self.state_space: StateSpace = scenario.state_space
-        self.action_set = scenario.action_set
-        self.measures = scenario.measures
-        self.interactions = scenario.interactions
-        self.horizon = scenario.horizon
-        self.repeats = scenario.repeats
-        self.recorded = scenario.recorded
+        super().__init__(scenario)
         n = len(self.agents)
         self._noise = np.zeros(n)
         self._delays = np.zeros(n, dtype=np.int64)
@@ -89,45 +76,21 @@ class PerceivedScenario(Scenario):
             self._delays[mask] = np.maximum(self._delays[mask], one.delay)
             if one.lost:
                 named = mask_of(one.lost, self.agents, f"{key}.lost")
-                bodies = np.array([named[list(group)].any() for group in scenario.groups])
-                lost |= np.outer(mask, bodies)
+                lost |= np.outer(mask, [named[list(group)].any() for group in scenario.groups])
             if one.reach is not None:
                 lost[mask] |= distances[mask] > one.reach
-        own = ~scenario.perceived
+        bodies = len(scenario.groups)
+        body = np.repeat(np.arange(bodies), [len(group) for group in scenario.groups])
+        own = body[:, None] == np.arange(bodies)
         self.perceived: BoolArray = ~own & ~lost
-        self._body = np.zeros(n, dtype=np.int64)
-        for body, group in enumerate(scenario.groups):
-            self._body[list(group)] = body
         # Agents that each agent assumes to take the neutral action
-        self._unperceived = [
-            np.flatnonzero(~(own | self.perceived)[i][self._body]) for i in range(n)
-        ]
+        self._unperceived = [np.flatnonzero(~(own | self.perceived)[i][body]) for i in range(n)]
         self._low, width = self.state_space.ranges
         self._scale = self._noise[:, None] * width
         self._width = width
         self._periodic = np.array([v.periodic for v in self.state_space.variables])
         self._past: list[FloatArray] = []
         self._rng = stream_of(0, STREAM)
-
-    @cached_property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Agents of each body."""
-        return self.scenario.groups
-
-    @cached_property
-    def roles(self) -> tuple[str, ...]:
-        """The role of every agent."""
-        return self.scenario.roles
-
-    @property
-    def predicts(self) -> bool:
-        """Whether the scenario predicts."""
-        return self.scenario.predicts
-
-    @property
-    def lacks_prediction(self) -> str:
-        """Reason why there is no prediction."""
-        return self.scenario.lacks_prediction
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode and return the perceived states."""
@@ -145,27 +108,6 @@ class PerceivedScenario(Scenario):
         """Return the predictions of the agents."""
         prediction = self.scenario.predict()
         return None if prediction is None else PerceivedPrediction(prediction, self)
-
-    def partners(self) -> Sequence[int] | None:
-        """Return the mirror image of every agent."""
-        return self.scenario.partners()
-
-    def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the true state."""
-        return self.scenario.measure()
-
-    def constants_of_episode(self) -> Mapping[str, Any]:
-        """Return the constants of the episode."""
-        return self.scenario.constants_of_episode()
-
-    @property
-    def draws(self) -> bool:
-        """Whether recordings of its episodes can be drawn."""
-        return self.scenario.draws
-
-    def animate(self, recording: Mapping[str, Any], path: Path) -> None:
-        """Write a recording as an animation."""
-        self.scenario.animate(recording, path)
 
     def unperceived(self, agent: int) -> IntArray:
         """Return the agents that an agent does not perceive ``(k,)``."""
@@ -207,6 +149,7 @@ class PerceivedPrediction(Prediction):
     def __init__(self, prediction: Prediction, scenario: PerceivedScenario) -> None:
         self._prediction = prediction
         self._scenario = scenario
+        self.repeats = prediction.repeats
 
     def of(self, agent: int) -> Prediction:
         """Return the prediction of one agent."""
@@ -264,9 +207,10 @@ def distances_of(scenario: Scenario) -> FloatArray:
     groups = scenario.groups
     bodies = {agent: body for body, group in enumerate(groups) for agent in group}
     graph = nx.path_graph(len(groups))
-    if scenario.interactions is not None:
+    interactions = interactions_of(scenario)
+    if interactions is not None:
         graph.remove_edges_from(list(graph.edges))
-        graph.add_edges_from((bodies[a], bodies[b]) for a, b in scenario.interactions)
+        graph.add_edges_from((bodies[a], bodies[b]) for a, b in interactions)
     apart = np.full((len(groups), len(groups)), np.inf)
     for body, lengths in nx.all_pairs_shortest_path_length(graph):
         apart[body, list(lengths)] = list(lengths.values())

@@ -15,8 +15,9 @@ import numpy as np
 
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import SUCCESS, Measure
-from ...core.interface.prediction import EmbodiedPrediction, first_alike
-from ...core.interface.scenario import Embodiment, Scenario, Transition
+from ...core.interface.prediction import Assumptions, EmbodiedPrediction, first_alike
+from ...core.interface.recording import EpisodeRecorder
+from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, working_seconds
@@ -40,7 +41,7 @@ MAX_BEND = 2.5
 """Maximum start angle of a joint other than the base [rad]."""
 
 
-class KinematicChain(Scenario, Embodiment):
+class KinematicChain(Scenario):
     """A planar arm with exact predictions and support for self-models.
 
     Parameters
@@ -61,7 +62,7 @@ class KinematicChain(Scenario, Embodiment):
     """
 
     measures = MEASURES
-    recorded = ("angles", "speeds", "failed")
+    recorded: tuple[str, ...] = ("angles", "speeds", "failed")
 
     def __init__(self, settings: KinematicChainSettings) -> None:
         expect("settings of an arm", KinematicChainSettings, settings=settings)
@@ -78,6 +79,9 @@ class KinematicChain(Scenario, Embodiment):
         self.state_space = self._states.space
         self.nominal_effects = (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * n
         """Effect of a joint's speed on its twist ``(3, 2)``: it only turns."""
+        self.constants: tuple[str, ...] = ()
+        self.levers: FloatArray = np.zeros(0)
+        self.regression_shapes: tuple[tuple[int, int], ...] = ()
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # Failures of the coming step, for informed predictions; the others are of the last step.
         self._known = Failures(settings.failures, self.agents, self._limits)
@@ -136,19 +140,10 @@ class KinematicChain(Scenario, Embodiment):
         """Return many arms that are stepped in one call; None if joints fail."""
         return None if self.settings.failures else ChainEnvironments(self, count)
 
-    def embodiment(self) -> Embodiment:
-        """Return the arm itself, because its joints support self-models."""
-        return self
-
     def predict(self) -> ChainPrediction:
         """Predict from the present state, with failures if the settings say `informed`."""
         nominal = self.settings.predictor == "nominal"
-        return self.predict_with(self.nominal_effects if nominal else self._actual_effects())
-
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> ChainPrediction:
-        """Predict from the present state, given the effects ``(3, 2)`` of the joints."""
+        effects = self.nominal_effects if nominal else self._actual_effects()
         return ChainPrediction(self, effects, self._angles, self._speeds, self._distance())
 
     def _actual_effects(self) -> tuple[FloatArray, ...]:
@@ -199,10 +194,7 @@ class KinematicChain(Scenario, Embodiment):
         """Draw the present posture and the goal to a picture file."""
         from .drawing import snapshot
 
-        state = self.measure()
-        recording = {name: np.asarray(state[name])[None] for name in self.recorded}
-        constants = {name: np.asarray(it) for name, it in self.constants_of_episode().items()}
-        snapshot(recording | constants, path)
+        snapshot(EpisodeRecorder(self).recording(), path)
 
     def _reward(self, distance: FloatArray, approach: FloatArray) -> FloatArray:
         """Return the reward ``(m,)`` for distance and approach [m]."""
@@ -320,6 +312,12 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         self.speeds = np.ascontiguousarray(commanded.T)
         self.turns = np.ascontiguousarray((after - angles).T)
         self._fractions = self.speeds / arm.settings.top_speed
+        self._present = angles, speeds, before
+
+    def assuming(self, assumptions: Assumptions) -> ChainPrediction:
+        """Return the prediction for other effects of the joints."""
+        effects = self.effects if assumptions.effects is None else assumptions.effects
+        return ChainPrediction(self.arm, effects, *self._present)
 
     def view_after(self, joint_actions: IntArray) -> ChainView:
         """Return the arm after joint actions ``(m, n)``."""

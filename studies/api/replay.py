@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
+from ...core.interface.abilities import Animated
 from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..store.store import Store
@@ -57,7 +58,7 @@ def draw_episode(
         if episode not in recorded:
             raise SpecError(f"episode = {show(episode)}: {closest(episode, recorded)}")
         scenario = trial.world()
-        if not scenario.draws:
+        if not isinstance(scenario, Animated):
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
         if path is None:
             drawing = directory / "replay" / f"{trial.identity[:8]}-{episode}.gif"
@@ -65,6 +66,9 @@ def draw_episode(
         else:
             drawing = Path(path)
         if path is not None or not drawing.exists():
-            scenario.animate(store.recording(trial.identity, episode), drawing)
+            try:
+                scenario.animate(store.recording(trial.identity, episode), drawing)
+            except ValueError as error:
+                raise SpecError(f"no replay: {error}") from None
     title = f"{trial.condition}, seed {trial.seed}, {episode} episode"
     return Replay(drawing, title)

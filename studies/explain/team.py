@@ -17,9 +17,10 @@ import pandas as pd
 from ...core.agents.fuzzy import FuzzyAgents
 from ...core.agents.loop import world_seed
 from ...core.agents.team import Team
+from ...core.interface.abilities import PolicyMap, ShowsPolicy, horizon_of
 from ...core.interface.experience import Observation
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import PolicyMap, Scenario
+from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
 from ...core.models.learned_predictor import LearnedPredictor
 from ...core.models.pose_model import PoseModel
@@ -159,17 +160,17 @@ def _policy(session: Session) -> PolicyMap | str:
     nowhere: FloatArray = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
 
     def choose(prediction: Prediction) -> IntArray:
-        seen = Observation(nowhere, scenario, imagined=prediction)
-        return session.team.act(seen, explore=False).joint_action
+        return session.team.act(Observation(nowhere, prediction), explore=False).joint_action
 
-    def predict() -> Prediction | None:
-        return agents.model.predict(Observation(nowhere, scenario))
+    def predict() -> Prediction:
+        return agents.model.predict(session.team.observe(scenario, nowhere))
 
+    if not isinstance(scenario, ShowsPolicy):
+        return "the scenario has no method show_policy for agents such as these"
     try:
-        policy = scenario.show_policy(choose, predict)
+        return scenario.show_policy(choose, predict)
     except ValueError as error:
         return str(error)
-    return policy or "the scenario has no method show_policy for agents such as these"
 
 
 def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
@@ -210,12 +211,11 @@ def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
         states = scenario.reset(world, episode)
         team.reset(world, episode)
         for _ in range(DECISIONS):
-            seen = Observation(states, scenario)
+            seen = team.observe(scenario, states)
             joint = team.act(seen, explore=False).joint_action
-            learned = model.predict(seen)
-            assert learned is not None
-            guesses = {"learned": _states(learned, joint), "persistence": states}
-            given = scenario.predict() if scenario.horizon == horizon else None
+            learned = _states(model.predict(seen), joint)
+            guesses = {"learned": learned, "persistence": states}
+            given = scenario.predict() if horizon_of(scenario) == horizon else None
             if given is not None:
                 guesses["given"] = _states(given, joint)
             reached = _held(scenario, joint, horizon)

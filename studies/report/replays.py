@@ -15,6 +15,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, NamedTuple, Protocol
 
+from ...core.interface.abilities import Animated
 from ...core.plugins.settings import ScenarioSettings
 from ...scenarios import SCENARIOS
 from ..errors import SpecError
@@ -156,6 +157,8 @@ def _films(store: Store, planned: Sequence[Planned], max_bytes: int) -> list[Fil
 def _gif(store: Store, trial: Trial) -> str:
     """Return the last episode of a trial as a GIF in base64; empty if it cannot be drawn."""
     scenario = trial.world()
+    if not isinstance(scenario, Animated):
+        return ""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "episode.gif"
         try:

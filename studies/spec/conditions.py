@@ -17,6 +17,7 @@ from ...core.agents.joint import Granularity, join_agents
 from ...core.agents.mixed import MixedSettings
 from ...core.hierarchy.failures import LeftAgents
 from ...core.hierarchy.hierarchy import Hierarchy
+from ...core.interface.abilities import interactions_of
 from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
@@ -110,7 +111,7 @@ class ConditionSettings(Settings):
             check_team(len(scenario.agents), SECONDS_PER_PAIR)
         except ValueError as error:
             raise ValueError(f"scenario: has {len(scenario.agents)} agents: {error}") from None
-        pairs = scenario.interactions
+        pairs = interactions_of(scenario)
         return scenario, build(self.topology, scenario.agents, scenario.groups, pairs)
 
     @property

@@ -14,9 +14,9 @@ import numpy as np
 
 from ...core.agents.loop import policy_seed
 from ...core.agents.team import Team
-from ...core.interface.experience import Observation
+from ...core.interface.abilities import options_of
 from ...core.interface.measures import Measure, measures_of
-from ...core.interface.scenario import Scenario, checked_scenario
+from ...core.interface.scenario import Scenario, checked_scenario, has_same_agents
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage
@@ -53,7 +53,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     """
     world = checked_scenario(settings.scenario.build())
     scenario, hierarchy = settings.arrange(world)
-    if world.options is not None and scenario is not world:
+    if options_of(world) is not None and scenario is not world:
         key = "scenario.perception" if settings.scenario.perception else "agents"
         raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
     failures = settings.topology.failures
@@ -104,9 +104,8 @@ def transfer(
         with _naming(f"evaluations.{name}"):
             there = arrange(other, seed)
             has_leader = there.team.leader is not None or own.team.leader is not None
-            is_alike = other.acts_as(settings) and there.scenario.agents == own.scenario.agents
+            is_alike = other.acts_as(settings) and has_same_agents(there.scenario, own.scenario)
             if is_alike and not has_leader:
-                own.team.check_scenario(there.scenario)
                 there = there._replace(team=own.team)
             else:
                 there.team.warm_start(own.team)
@@ -192,5 +191,5 @@ def _arrangements(condition: Condition) -> Iterator[Arrangement]:
     evaluations = transfer(own, settings, condition.evaluations, 0)
     for there in (own, *(a for _, a in stages), *(a for _, a in evaluations)):
         if settings.learner.needs_rewards:
-            there.team.check(Observation(there.scenario.reset(0), there.scenario))
+            there.team.check(there.team.observe(there.scenario, there.scenario.reset(0)))
         yield there

@@ -14,9 +14,10 @@ from typing import Any
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.many_environments import ManyEnvironmentsLoop
 from ...core.agents.team import Team
+from ...core.interface.abilities import Recorded
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import checked_scenario
-from ...core.interface.stacked import LoopedEnvironments
+from ...core.interface.stacked import make_environments
 from ...core.numerics import working_seconds
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
@@ -190,7 +191,8 @@ class Session:
             arrangement = self._own._replace(team=team)
         else:
             observers.append(self._watch.add)
-            if len(self.world.recorded) > 0 and self.trial.recorded:
+            is_recorded = isinstance(self.world, Recorded) and len(self.world.recorded) > 0
+            if is_recorded and self.trial.recorded:
                 observers.append(self._record)
         self._run(
             arrangement, phase, observers, episodes=episodes,
@@ -224,10 +226,7 @@ class Session:
     def _parallel_loop(self) -> ManyEnvironmentsLoop:
         settings = self.trial.settings
         count = settings.learner.n_environments
-        first = arrange(settings, self.trial.seed)
-        environments = first.scenario.environments(count) or LoopedEnvironments(
-            [first.scenario, *(arrange(settings, 0).scenario for _ in range(count - 1))]
-        )
+        environments = make_environments(lambda: arrange(settings, 0).scenario, count)
         return ManyEnvironmentsLoop(
             environments, self.scenario, self.team, self.trial.steps, self.trial.seed
         )
@@ -254,6 +253,7 @@ class Session:
         if record.step == 0:  # no transition contains the initial state
             scenario = checked_scenario(self.trial.settings.scenario.build())
             scenario.reset(world_seed(self.trial.seed, record.episode), record.episode)
+            assert isinstance(scenario, Recorded)
             self._recorder = EpisodeRecorder(scenario)
         self._recorder.add(record.transition)
         if record.last:

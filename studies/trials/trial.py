@@ -155,7 +155,7 @@ class TrialResult:
     measures: tuple[Measure, ...]
     """Measures of any episode. Scenarios of evaluations may lack some of them."""
     recordings: dict[str, Recording]
-    """Training episodes of `Trial.recorded` by name, if the scenario is a `RecordedScenario`. With
+    """Training episodes of `Trial.recorded` by name, if the scenario is `Recorded`. With
     `keep_teams`, `TEAM` names the arrays of the trained team. They are a function of the trial."""
     seconds: dict[str, float]
     """Duration of each part of the control loop [s]; differs from run to run."""

@@ -74,7 +74,7 @@ def test_the_random_act_without_predictions(spec: Path, capsys: pytest.CaptureFi
     assert [row.steps for row in run_trial(trial).rows] == [3, 3, 3]
     assert main(["check", str(spec), "--set", 'preset="random"']) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert "not checked predictions: the scenario has no method predict" in printed
+    assert "not checked predictions: the scenario Mute has no method predict" in printed
 
 
 def test_settings_say_whether_they_need_predictions() -> None:
@@ -87,13 +87,15 @@ class Unpredicted(LineUp):
     """Carts of which nothing is predicted."""
 
     predict = Scenario.predict
-    with_exact_prediction = Scenario.with_exact_prediction
+
+    def with_exact_prediction(self) -> None:
+        """Return None, because nothing is predicted."""
 
 
 def test_joint_agents_predict_what_their_scenario_predicts() -> None:
     mute = Unpredicted(LineUpSettings())
-    assert join_agents(LineUp(LineUpSettings()), "team").predicts
-    assert not join_agents(mute, "team").predicts
+    assert not join_agents(LineUp(LineUpSettings()), "team").lacks_prediction
+    assert "has no method predict" in join_agents(mute, "team").lacks_prediction
     assert join_agents(mute, "team").predict() is None
     findings = check_scenario(lambda: Unpredicted(LineUpSettings()))
     assert set(CHECKS) - set(findings.passed) == {"predictions", "sensed and predicted"}

@@ -176,7 +176,7 @@ def test_agents_that_are_not_seen_maintain() -> None:
     )
     scenario.reset(0)
     prediction = scenario.predict()
-    joint = joint_of(team, scenario, imagined=prediction)
+    joint = joint_of(team, scenario, prediction=prediction)
     first, second, third, fourth = prediction.asked  # type: ignore[attr-defined]
     assert (first[:, 2:] == maintain).all()
     assert len(np.unique(first[:, :2], axis=0)) == 16  # all actions of itself and the one below

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,6 @@ class BayesianAgents(na.Agents[Beliefs]):
     """
 
     acts_in_parallel = True
-    is_vectorized: ClassVar[bool] = True
 
     def __init__(self, settings: Bayesian, context: na.AgentContext) -> None:
         self.rng = np.random.Generator(np.random.PCG64(context.seed))
@@ -87,7 +86,7 @@ class BayesianAgents(na.Agents[Beliefs]):
 
     def observe(self, seen: na.Observation, *, explore: bool) -> Beliefs:
         """Return the signals; no message has been received yet."""
-        signals = seen.present[..., 0] > 0.5
+        signals = seen.states[..., 0] > 0.5
         return Beliefs(signals, np.zeros((*signals.shape, 2)))
 
     def act(self, inputs: Beliefs, inbox: na.Inbox) -> IntArray:
@@ -107,6 +106,11 @@ class BayesianAgents(na.Agents[Beliefs]):
         if self.indifferent == "coin":
             return (self.rng.random(chance.shape) < chance).astype(np.int64)
         return (chance > 0.5).astype(np.int64)
+
+    def learn_batch(
+        self, joint_actions: IntArray, inputs: Beliefs, steps: na.Transitions, last: BoolArray
+    ) -> None:
+        """Do nothing, because nothing is learned."""
 
     def state_dict(self) -> Mapping[str, NDArray[Any]]:
         """Return no arrays, because nothing is learned."""

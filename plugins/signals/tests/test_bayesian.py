@@ -27,7 +27,7 @@ def played(n, topology="chain", indifferent="signal", count=WORLDS):
     worlds = SignalEnvironments(world, count)
     states = worlds.reset([np.random.SeedSequence(k) for k in range(count)])
     agents = team(world, topology, indifferent)
-    joint = agents.act(Observation(states, world), explore=False).joint_action
+    joint = agents.act(Observation(states), explore=False).joint_action
     return worlds.plays.right(joint), worlds.plays.vote(joint), agents.hierarchy
 
 
@@ -65,8 +65,8 @@ def test_one_world_is_as_many():
     agents = team(world)
     worlds = SignalEnvironments(world, 8)
     seeds = [np.random.SeedSequence(k) for k in range(8)]
-    together = agents.act(Observation(worlds.reset(seeds), world), explore=False).joint_action
-    alone = [agents.act(Observation(world.reset(seed), world)).joint_action for seed in seeds]
+    together = agents.act(Observation(worlds.reset(seeds)), explore=False).joint_action
+    alone = [agents.act(Observation(world.reset(seed))).joint_action for seed in seeds]
     assert np.array_equal(together, alone)
 
 

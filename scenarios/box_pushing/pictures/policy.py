@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch
 
+from ....core.interface.abilities import PolicyMap
 from ....core.interface.prediction import Prediction
-from ....core.interface.scenario import PolicyMap
 from ....core.numerics import FloatArray, IntArray, wrap
 from ..prediction.prediction import BoxPrediction
 from ..world.boxes import BoxSpec

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.prediction import Blocks, EmbodiedPrediction, Tables
+from ....core.interface.prediction import Assumptions, Blocks, EmbodiedPrediction, Tables
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ....core.search.best_response import RespondingPrediction, Responses, Search
@@ -24,8 +24,8 @@ from ..states.state_spaces import BoxStateSpace
 from ..states.variables import progress_of
 from ..world.reward import Task, reward
 from ..world.settings import InfraredSettings
-from .calibration import PushBelief, outcomes
-from .models import PushModel
+from .calibration import PushBelief, model_of, outcomes
+from .models import LearnedPush, PushModel
 from .poses import samples_of
 from .push import push
 from .responses import Outlook, respond
@@ -102,6 +102,21 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         self.settings = settings
         self.groups = settings.groups
         self._last: tuple[bytes, SituationBatch] | None = None  # the last request
+
+    def assuming(self, assumptions: Assumptions) -> BoxPrediction:
+        """Return the prediction for other effects, constants of the push or learned pushing."""
+        situation = self.situation
+        model = self.model
+        settings = self.settings
+        if assumptions.effects is not None:
+            situation = replace(situation, effects=tuple(assumptions.effects))
+        if assumptions.constants is not None:
+            model = model_of(settings.belief, assumptions.constants)
+        if assumptions.regressions is not None:
+            learned = LearnedPush(settings.period, *assumptions.regressions)
+            model = model._replace(learned=learned)
+            settings = replace(settings, horizon=assumptions.decisions * settings.period)
+        return BoxPrediction(situation, model, settings)
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:

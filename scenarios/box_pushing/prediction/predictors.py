@@ -19,6 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ....core.interface.prediction import Assumptions
 from ....core.numerics import FloatArray, IntArray
 from ....core.values.rule_base import RuleBase
 from ..states.situations import SituationBatch
@@ -111,6 +112,13 @@ class ExactPrediction(BoxPrediction):
     ) -> None:
         super().__init__(situation, model, settings)
         self.future = future
+
+    def assuming(self, assumptions: Assumptions) -> BoxPrediction:
+        """Return the prediction under other assumptions, by simulation unless poses are learned."""
+        other = super().assuming(assumptions)
+        if assumptions.regressions is not None:
+            return other
+        return ExactPrediction(other.situation, other.model, other.settings, self.future)
 
     def best_responses(self, rules: RuleBase) -> None:
         """Return None, because every joint action must be simulated."""

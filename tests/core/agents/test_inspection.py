@@ -12,7 +12,7 @@ from nested_agents.core.agents.loop import policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.failures import LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.experience import Experience, Observation
+from nested_agents.core.interface.experience import Experience
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
@@ -39,16 +39,15 @@ def team_of(table: dict[str, Any], scenario: Any, *failures: LostMessages) -> Te
 
 def train(scenario: Any, team: Team, *, inspect: bool) -> list[list[int]]:
     """Return the joint actions of an episode of training."""
-    seen = Observation(scenario.reset(3), scenario)
-    team.reset(3, 0)
-    team.begin_episode()
+    seen = team.observe(scenario, scenario.reset(3))
+    team.reset(3, 0, learn=True)
     joint_actions = []
     for step in range(12):
         decision = team.act(seen, inspect=inspect)
         transition = scenario.step(decision.joint_action)
         team.learn(Experience(seen, decision, transition, step == 11))
         joint_actions.append(decision.joint_action.tolist())
-        seen = Observation(transition.states, scenario, decision.joint_action)
+        seen = team.observe(scenario, transition.states, decision.joint_action)
     return joint_actions
 
 
@@ -91,7 +90,7 @@ def test_values_of_the_last_agent_are_values_of_predicted_states() -> None:
     decision = team.act(observation, explore=False, inspect=True)
     tried = np.tile(decision.joint_action, (len(scenario.action_set), 1))
     tried[:, 1] = np.arange(len(scenario.action_set))
-    expected = team.value(scenario.agents[1], observation.states(1, tried))
+    expected = team.value(scenario.agents[1], observation.prediction.states(1, tried))
     np.testing.assert_allclose(list(decision.agents[1].values.values()), expected, atol=1e-9)
 
 

@@ -16,6 +16,7 @@ from nested_agents.core.agents.joint import Granularity, JointPrediction, join_a
 from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
+from nested_agents.core.interface.abilities import Embodiment
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.batch import BatchTDSettings
@@ -309,7 +310,7 @@ def test_predictions_can_do_what_the_scenarios_can(
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
     world, robots = line_world(2, 2), join_agents(line_world(2, 2), "body")
-    assert robots.embodiment() is None
+    assert not isinstance(robots, Embodiment)
     assert robots.agents == ("cart0", "cart1")
     assert len(robots.action_set) == 16
     assert robots.action_set.names[robots.action_set.neutral] == "maintain+maintain"

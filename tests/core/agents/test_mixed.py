@@ -182,7 +182,7 @@ def test_a_reward_of_a_terminal_state_that_does_not_absorb_is_received_once(worl
     for absorbing, value in ((False, 2.0), (True, 2.0 / (1.0 - gamma))):
         team = Team(settings, world, chain_of(world.agents), policy_seed(0))
         states = world.reset(0)
-        team.begin_episode()
+        team.reset(0, 0, learn=True)
         seen = look(world, states)
         ended = Transition(states, 2.0, True, False, {}, absorbing=absorbing)
         team.learn(Experience(seen, team.act(seen), ended, last=True))
@@ -208,10 +208,12 @@ def test_frequencies_of_a_role_are_the_mean_of_its_agents(line_world) -> None:
         world.roles = ("cart",) * len(world.agents)
     settings = TDLambdaSettings(weights="role")
     former = Team(settings, small, chain_of(small.agents), policy_seed(0))
-    former.only(FuzzyAgents).seen = np.array([[4.0, 0.0, 2.0, 2.0], [0.0, 8.0, 0.0, 0.0]])
+    former.only(FuzzyAgents).action_counts.totals = np.array(
+        [[4.0, 0.0, 2.0, 2.0], [0.0, 8.0, 0.0, 0.0]]
+    )
     successor = Team(settings, large, chain_of(large.agents), policy_seed(1))
     successor.warm_start(former)
-    assert fuzzy(successor).seen.tolist() == [[2.0, 4.0, 1.0, 1.0]] * 3
+    assert fuzzy(successor).action_counts.totals.tolist() == [[2.0, 4.0, 1.0, 1.0]] * 3
 
 
 def test_messages_between_parts_fail_too(world) -> None:

@@ -87,7 +87,7 @@ def run_steps(team: Team, world, steps: int, *, end: bool = False) -> list[list[
 
 def run_episode(team: Team, world, seed: int, steps: int = 12) -> list[list[int]]:
     world.reset(seed)
-    team.begin_episode()
+    team.reset(0, 0, learn=True)
     return run_steps(team, world, steps, end=True)
 
 
@@ -105,7 +105,7 @@ def test_a_saved_team_continues_bit_for_bit_within_an_episode(
     for episode in range(2):
         run_episode(team, world, episode)
     world.reset(2)
-    team.begin_episode()
+    team.reset(0, 0, learn=True)
     run_steps(team, world, 5)
     team.save(tmp_path / "team.npz")
     elsewhere, restored = copy.deepcopy(world), team_of(name, world, seed=99)
@@ -191,6 +191,8 @@ def test_bounds_of_traces_by_other_rows_are_refused(world) -> None:
 
 class Witness:
     """Notes what each agent is told, and values its actions by a script."""
+
+    continues = False
 
     def __init__(self, best: list[int]) -> None:
         self.best, self.told = best, {}
@@ -325,7 +327,7 @@ def test_permuting_agents_permutes_what_is_learned(name: str, line_world) -> Non
     for episode in range(2):
         for team, world in ((one, here), (two, there)):
             world.reset(episode)
-            team.begin_episode()
+            team.reset(0, 0, learn=True)
         for step in range(10):
             joint = rng.integers(4, size=3)
             for team, world, done in ((one, here, joint), (two, there, joint[there.order])):

@@ -122,11 +122,10 @@ def team(hierarchy: Hierarchy, *failures: LostMessages, **keys: object) -> Team:
 def told_in(team: Team, decisions: int = 20) -> tuple[np.ndarray, np.ndarray]:
     """What every agent was told ``(T, 3, k)``, and what all did ``(T, 3)``."""
     told, did = [], []
-    team.reset(0, 0)
-    team.begin_episode()
+    team.reset(0, 0, learn=True)
     previous = None
     for _ in range(decisions):
-        seen = Observation(np.zeros((3, 1)), fuzzy(team).scenario, previous)
+        seen = Observation(np.zeros((3, 1)), previous=previous)
         decision = team.act(seen)
         previous = decision.joint_action
         did.append(previous)
@@ -172,8 +171,8 @@ def test_who_is_told_learns_a_best_reply_and_who_is_not_does_not() -> None:
         both = Team(shared, game, Hierarchy(game.agents, edges), np.random.SeedSequence(2))
         for episode in range(10):
             states = game.reset(episode)
-            both.begin_episode()
-            seen = Observation(states, game)
+            both.reset(0, 0, learn=True)
+            seen = Observation(states)
             for play in range(20):
                 decision = both.act(seen)
                 transition = game.step(decision.joint_action)

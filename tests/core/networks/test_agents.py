@@ -282,7 +282,7 @@ def test_what_arrives_is_learned_from() -> None:
     table = {"rollout": 32, "learning_rate": 0.003, "entropy": 0.05}
     team, agents = team_of(world, Hierarchy("abc", list(pairwise("abc"))), failures, **table)
     for _ in range(1000):
-        team.begin_episode()
+        team.reset(0, 0, learn=True)
         seen = look(world)
         decision = team.act(seen)
         reward = float(decision.joint_action[1] == decision.joint_action[2])
@@ -355,7 +355,7 @@ class Mine(na.Peer):
         self.hierarchy = hierarchy
 
     def act(self, seen, *, explore=True):
-        return [0] * len(seen.present)
+        return [0] * len(seen.states)
 """
 SPEC = """
 scenario.kind = "line-up"

@@ -12,7 +12,7 @@ from nested_agents.core.hierarchy.failures import LeftAgents
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Observation
 from nested_agents.core.interface.scenario import checked_scenario
-from nested_agents.core.interface.stacked import LoopedEnvironments
+from nested_agents.core.interface.stacked import make_environments
 from nested_agents.core.learners import LEARNERS
 from nested_agents.scenarios import SCENARIOS
 
@@ -50,9 +50,8 @@ def team_of(kind="hierarchy-ppo", table=SPREAD, seed=0, failures=(), **changes):
 
 def loop_of(team, table=SPREAD, most=1000):
     count = SMALL["environments"]
-    world = build(table)
-    many = world.environments(count) or LoopedEnvironments([build(table) for _ in range(count)])
-    return ManyEnvironmentsLoop(many, world, team, most, 0)
+    many = make_environments(lambda: build(table), count)
+    return ManyEnvironmentsLoop(many, build(table), team, most, 0)
 
 
 def weights(team):
@@ -98,27 +97,27 @@ def test_networks_learn_in_every_scenario(kind, name):
 def test_environments_decide_as_each_by_itself_and_in_any_order(kind):
     team, world = team_of(kind), build(SPREAD)
     states = np.stack([world.reset(seed) for seed in range(9)])
-    together = team.act(Observation(states, world), explore=False).joint_action
-    alone = [team.act(Observation(own, world), explore=False).joint_action for own in states]
+    together = team.act(Observation(states), explore=False).joint_action
+    alone = [team.act(Observation(own), explore=False).joint_action for own in states]
     assert np.array_equal(together, np.stack(alone))
     order = np.random.default_rng(0).permutation(9)
-    mixed = team.act(Observation(states[order], world), explore=False).joint_action
+    mixed = team.act(Observation(states[order]), explore=False).joint_action
     assert np.array_equal(mixed, together[order])
 
 
 def test_permuting_agents_permutes_their_actions():
     team, world = team_of("ippo", numbered=False), build(SPREAD)
     states = np.stack([world.reset(seed) for seed in range(9)])
-    plain = team.act(Observation(states, world), explore=False).joint_action
+    plain = team.act(Observation(states), explore=False).joint_action
     order = np.array([2, 0, 1])
-    mixed = team.act(Observation(states[:, order], world), explore=False).joint_action
+    mixed = team.act(Observation(states[:, order]), explore=False).joint_action
     assert np.array_equal(mixed, plain[:, order])
 
 
 def test_agents_see_what_they_are_told():
     team, world = team_of(), build(SPREAD)
     states = np.stack([world.reset(seed) for seed in range(4)])
-    decision = team.act(Observation(states, world))
+    decision = team.act(Observation(states))
     told = decision.inputs[0].actor[:, :, : len(team.parts[0].told_names)]
     assert not told[:, 0].any()
     assert (told[:, 1, :5].argmax(axis=1) == decision.joint_action[:, 0]).all()

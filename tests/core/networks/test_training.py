@@ -221,7 +221,7 @@ def ended(name: str, *, terminated: bool) -> Any:
     session = Session(trial)
     team = session.team
     seen = look(session.scenario, session.scenario.reset(0))
-    team.begin_episode()
+    team.reset(0, 0, learn=True)
     decision = team.act(seen)
     states = session.scenario.step(decision.joint_action).states
     over = Transition(states, 1.0, terminated, not terminated, {})
@@ -286,7 +286,7 @@ def test_agents_learn(kind: str) -> None:
     def rate(episodes: int, *, learn: bool) -> float:
         paid = 0.0
         for _ in range(episodes):
-            team.begin_episode()
+            team.reset(0, 0, learn=True)
             seen = look(world, world.reset())
             decision = team.act(seen, explore=learn)
             transition = world.step(decision.joint_action)

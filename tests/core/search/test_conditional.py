@@ -29,7 +29,7 @@ def test_values_are_means_by_what_was_seen_with_the_same_own_action():
         for i in range(3):
             for j in range(3):
                 counts[i, joint[i], j, joint[j]] += 1.0
-    assert (fuzzy(team).given == counts).all()
+    assert (fuzzy(team).action_counts.conditional == counts).all()
     given = counts[0] / counts[0].sum(axis=2, keepdims=True)
     captured = {}
 
@@ -58,8 +58,8 @@ def test_it_is_saved_and_loaded(tmp_path):
     team.save(tmp_path / "team.npz")
     other = team_of()[1]
     other.load(tmp_path / "team.npz")
-    assert (fuzzy(other).given == fuzzy(team).given).all()
-    assert fuzzy(other).given.sum() > 3 * 4 * 3 * 4
+    assert (fuzzy(other).action_counts.conditional == fuzzy(team).action_counts.conditional).all()
+    assert fuzzy(other).action_counts.conditional.sum() > 3 * 4 * 3 * 4
 
 
 def test_sampling_refuses_it():

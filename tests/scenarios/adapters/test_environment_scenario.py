@@ -38,6 +38,7 @@ from made_up_environments import (
 )
 from pettingzoo import ParallelEnv
 
+from nested_agents.core.interface.abilities import Animated
 from nested_agents.core.learners import check_prediction
 from nested_agents.scenarios.adapters.scenario import from_gymnasium, from_pettingzoo
 from nested_agents.scenarios.adapters.settings import GymnasiumSettings, PettingZooSettings
@@ -180,7 +181,7 @@ def test_a_limit_of_time_truncates_and_the_return_can_be_the_success() -> None:
         id="CartPole-v1", options={"max_episode_steps": 3}, success={"return": 3.0}
     )
     world = settings.build()
-    assert not world.predicts
+    assert world.lacks_prediction
     assert world.predict() is None
     world.reset(0)
     steps = [world.step(np.array([k % 2])) for k in range(3)]
@@ -232,7 +233,7 @@ def test_a_spec_of_ten_lines_runs() -> None:
 def test_an_episode_is_drawn_by_playing_it_again(tmp_path: Path) -> None:
     pytest.importorskip("pygame", reason="extra [human]")
     world = GymnasiumSettings(**PENDULUM).build()
-    assert world.draws
+    assert isinstance(world, Animated)
     world.reset(4)
     first, seed = world.measure()["joint_action"], world.constants_of_episode()["seed"]
     world.step(np.array([4]))

@@ -10,6 +10,7 @@ from acting import fuzzy
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.interface.abilities import Animated
 from nested_agents.core.interface.measures import measures_of
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.models.self_model import SelfModelSettings
@@ -144,7 +145,7 @@ def test_the_role_of_an_agent_is_its_wheel() -> None:
 
 def test_it_can_be_recorded_drawn_and_predicted_exactly(tmp_path: Path) -> None:
     scenario = BoxPushing(BoxPushingSettings(action_repeat=4, belief={"load": 2.0}))
-    assert scenario.draws
+    assert isinstance(scenario, Animated)
     exact = scenario.with_exact_prediction().settings
     assert (exact.predictor, exact.prediction_horizon, exact.action_repeat) == ("exact", 4, 4)
     assert BoxPushingSettings.model_validate(exact.model_dump()) == exact

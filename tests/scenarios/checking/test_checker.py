@@ -99,6 +99,12 @@ class Bare(Scenario):
         return BarePrediction(self.places)
 
 
+class Unmeasured(Bare):
+    """Names what it records, and measures nothing."""
+
+    recorded = ("places",)
+
+
 class BarePrediction(Prediction):
     def __init__(self, places: Any) -> None:
         self.places = places
@@ -690,7 +696,8 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "predicts by global numbers": (line(predict=drawing), "the global state of numpy.random is"),
     "counts resets": (line(reset=counting_resets), "equal seeds: seed . after another episode"),
-    "bounds": (declared(bounds=((-1.0, 1.0), (-0.1, 0.1))), "values: .* leaves"),
+    "bounds": (space(DISTANCE, replace(LEAD, bounds=(-0.1, 0.1)), n_own=1), "values: lead leaves"),
+    "recorded without measure": (Unmeasured, "form: Unmeasured has recorded, and lacks measure"),
     "a group missing": (declared(groups=((0,),)), "form: groups .* must hold the 2 agents once"),
     "rewards of each": (
         predicting(rewards=lambda self, actions: np.zeros((len(actions), 2))),
@@ -781,7 +788,9 @@ BLIND: dict[str, Callable[[], Scenario]] = {
     "after": predicting(after=lambda self, joint_action: self),
     "partners": line(partners=lambda self: (0, 0)),
     "run_episode": line(run_episode=lambda self, *args, **kwargs: None),
-    "animate": line(animate=lambda self, recording, path: None),
+    "animate": line(
+        animate=lambda self, recording, path: None, constants_of_episode=lambda self: {}
+    ),
 }
 """What is wrong and not noticed."""
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from nested_agents.core.interface.abilities import PartiallyObserved
 from nested_agents.core.plugins.settings import PerceptionSettings
 from nested_agents.scenarios.faults.perception import distances_of, perceived
 from nested_agents.scenarios.line_up import LineUpSettings
@@ -20,8 +21,8 @@ def every(scenario) -> np.ndarray:
 
 def test_who_perceives_all_as_it_is_predicts_what_is_predicted() -> None:
     plain, scenario = carts(), carts(PerceptionSettings(agents="*"))
-    assert not plain.is_private
-    assert scenario.is_private
+    assert not isinstance(plain, PartiallyObserved)
+    assert isinstance(scenario, PartiallyObserved)
     np.testing.assert_array_equal(scenario.reset(4), plain.reset(4))
     joint = every(plain)
     for agent in range(3):

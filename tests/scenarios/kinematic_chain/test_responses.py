@@ -26,7 +26,7 @@ def decisions(settings, number, *, explore=True, weights="role", backwards=False
     theta = fuzzy(team).learner.theta
     theta[:] = np.random.default_rng(1).normal(scale=0.01, size=theta.shape)
     scenario.reset(world_seed(0, 0), 0)
-    team.begin_episode()
+    team.reset(0, 0, learn=True)
     taken = []
     for _ in range(number):
         taken.append(joint_of(team, scenario, explore=explore).copy())

@@ -225,7 +225,7 @@ def test_a_learner_that_acts_by_itself_is_kept_if_it_can_be_restored(tmp_path):
     with spec.sources.active():
         study = na.load(kept_at(tmp_path, spec))
     scenario, team = study.team()
-    seen = na.Observation(scenario.reset(0), scenario)
+    seen = team.observe(scenario, scenario.reset(0))
     assert team.state_dict()["taken"] == team.act(seen).joint_action[0]
     own = study.episodes.query("phase == 'evaluation'")["return"]
     assert na.reevaluate(study, ["chain"], jobs=1)["return"].tolist() == own.tolist()

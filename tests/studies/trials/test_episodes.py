@@ -138,6 +138,9 @@ class Recorded:
     def constants_of_episode(self):
         return {"dt": 0.5, "box": "square"}
 
+    def animate(self, recording, path):
+        raise NotImplementedError
+
 
 def test_frames_are_copies():
     recorder = EpisodeRecorder(Recorded())

@@ -17,7 +17,7 @@ def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
         partitions[gap].centers
     )
     fields = scenario.show_policy(
-        lambda prediction: joint_of(team, scenario, explore=False, imagined=prediction),
+        lambda prediction: joint_of(team, scenario, explore=False, prediction=prediction),
         scenario.predict,
     ).fields
     assert len(fields) == 2

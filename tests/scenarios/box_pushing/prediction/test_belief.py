@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
+from nested_agents.core.interface.abilities import Embodiment
 from nested_agents.core.interface.experience import Decision, Experience
 from nested_agents.core.interface.scenario import checked_scenario
 from nested_agents.core.learners.batch import BatchTDSettings
@@ -137,7 +138,7 @@ def test_the_twist_of_the_box_is_not_measured_when_robots_touch():
 
 def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
     (world, team), (_, other) = (calibrating(scenario(start="easy"), "body") for _ in "ab")
-    assert world.embodiment().constants == CONSTANTS
+    assert world.constants == CONSTANTS
     for _ in control_loop(world, team, episodes=1, steps=30, seed=0):
         pass
     assert fuzzy(team).model.calibration.constants.any()
@@ -149,7 +150,7 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
 
 def test_robots_of_other_scenarios_have_no_constants(line_world):
     joined = join_agents(checked_scenario(line_world(2, 2)), "body")
-    assert joined.embodiment() is None
+    assert not isinstance(joined, Embodiment)
 
 
 @pytest.mark.parametrize("predictor", ["rigid", "static", "exact"])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from nested_agents.core.interface.prediction import Assumptions
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.twists import mean_twists
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -122,7 +123,7 @@ def test_contact_takes_nothing_from_robots_in_the_open_however_fast_they_are_bel
     )
     believed = [effect.copy() for effect in scenario.nominal_effects]
     believed[0][2, -1] = rate  # turns by itself [rad/s]
-    slips = scenario.predict_with(believed).slips(np.full(4, 2))
+    slips = scenario.predict().assuming(Assumptions(effects=believed)).slips(np.full(4, 2))
     np.testing.assert_allclose(slips[:, 2], 0.0, atol=1e-9)
 
 
