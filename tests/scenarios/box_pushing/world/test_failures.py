@@ -140,7 +140,7 @@ def test_it_lasts_from_onset_to_end_over_episodes() -> None:
     [
         ({"wheels": "robot3.left"}, "no such wheel, allowed robot1.left"),
         ({"wheels": ("robot1.left", "Robot1.*")}, "'Robot1.*'"),
-        ({"episode": 2, "step": 1, "end_episode": 2, "end_step": 1}, "allowed: after its beginning"),
+        ({"episode": 2, "step": 1, "end_episode": 2, "end_step": 1}, "after its beginning"),
         ({"end_step": 1}, "needs an end_episode"),
         ({"wheels": ()}, "at least 1"),
         ({"episode": -1}, "greater than or equal to 0"),
