@@ -239,6 +239,8 @@ def _pointer(keys: Keys, value: object, model: type[BaseModel], table: Table) ->
 def misplaced(path: str, model: type[BaseModel], table: Table) -> str:
     """Return "did you mean ...?" if the last part of a dotted key is a key of some other table.
 
+    Of several tables, those that lie least deep are named.
+
     Parameters
     ----------
     path
@@ -249,8 +251,9 @@ def misplaced(path: str, model: type[BaseModel], table: Table) -> str:
         The table of the user: where it has a kind, other kinds are not searched.
     """
     key = path.rpartition(".")[2]
-    places = (name for name, _ in _places(key, model, table) if not f".{path}".endswith(f".{name}"))
-    matches = dict.fromkeys(places)
+    names = {name: name.count(".") for name, _ in _places(key, model, table)}
+    others = {name: depth for name, depth in names.items() if not f".{path}".endswith(f".{name}")}
+    matches = [name for name, depth in others.items() if depth == min(others.values())]
     return f"did you mean {' or '.join(map(repr, matches))}?" if matches and key != "kind" else ""
 
 
