@@ -580,7 +580,7 @@ def test_keys_that_no_learner_of_the_spec_has_are_refused(table) -> None:
     ("table", "hint"),
     [
         ({"robots": 3}, "did you mean 'scenario.robots'?"),
-        ({"joints": 3, "scenario": {"kind": "kinematic-chain"}}, "mean 'scenario.joints' or"),
+        ({"joints": 3, "scenario": {"kind": "kinematic-chain"}}, "mean 'scenario.joints'?"),
         ({"sweep": {"robots": [2, 3]}}, "did you mean 'scenario.robots'?"),
         ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge'?"),
         ({"preset": "paper", "trace_decay": 0.3}, "did you mean 'learner.trace_decay'?"),
