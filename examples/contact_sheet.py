@@ -21,7 +21,7 @@ from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES, 
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
-print("| box | area [m2] | mass [kg] | inertia [g m2] | friction radius [m] | fixtures |")
+print("| box | area [m2] | mass [kg] | inertia [g m2] | friction radius [m] | convex pieces |")
 print("|---|---|---|---|---|---|")
 for name, box in BOXES.items():
     print(

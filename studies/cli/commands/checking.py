@@ -115,12 +115,12 @@ def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCa
     from ....core.learners import check_prediction
     from ...spec.spec import Spec
 
-    checked: set[ScenarioSettings] = set()
+    checked: list[ScenarioSettings] = []
     for condition in Spec.load(Path(source), changes).conditions():
         settings = condition.settings.scenario
         with refused():
             check_prediction(condition.settings.learner, checked_scenario(settings.build()))
         if settings not in checked:
-            checked.add(settings)
+            checked.append(settings)
             episodes = sorted({0, *(begin for begin, _ in settings.failure_spans)})
             yield ScenarioCase(condition.label, settings.build, episodes)
