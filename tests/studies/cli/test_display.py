@@ -100,6 +100,8 @@ def test_no_label_orders_a_terminal(command, form, foreign, monkeypatch, capsys)
     assert main([command, str(foreign), "--format", form]) == 0
     out, err = capsys.readouterr()
     assert not set(out + err) & set("\x1b\x07\u202e\x9b")
+    if form == "markdown":
+        out = out.replace("\\\\", "\\")  # where a backslash is escaped
     assert form == "latex" or WRITTEN[:20] in out  # the rest is in the next line
 
 
