@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from .models import Slot, annotation_of, field_of, kind_of, kinds_at, model_at, models_of
-from .words import closest, near, show
+from .words import closest, near, shallowest, show
 
 Keys = tuple[int | str, ...]
 """Path of a value: keys of tables and indices of lists."""
@@ -251,9 +251,8 @@ def misplaced(path: str, model: type[BaseModel], table: Table) -> str:
         The table of the user: where it has a kind, other kinds are not searched.
     """
     key = path.rpartition(".")[2]
-    names = {name: name.count(".") for name, _ in _places(key, model, table)}
-    others = {name: depth for name, depth in names.items() if not f".{path}".endswith(f".{name}")}
-    matches = [name for name, depth in others.items() if depth == min(others.values())]
+    names = (name for name, _ in _places(key, model, table))
+    matches = shallowest(name for name in names if not f".{path}".endswith(f".{name}"))
     return f"did you mean {' or '.join(map(repr, matches))}?" if matches and key != "kind" else ""
 
 

@@ -94,8 +94,8 @@ def team_size(seconds_per_pair: float, agents: int = 1) -> AfterValidator:
     --------
     >>> team_size(5e-9).func(10_000)
     Traceback (most recent call last):
-    ValueError: a worker would hold 3 GB, and a decision take 0.50 s, by estimate, allowed up to
-    1 GB and 5 s
+    ValueError: needs an estimated 3 GB per worker and 0.50 s per decision, allowed: up to 1 GB and
+    5 s
     """
 
     def check_number(number: int) -> int:

@@ -166,3 +166,15 @@ def expect_pairs(allowed: str, /, **sequences: Iterable[object]) -> None:
         for index, pair in enumerate(pairs):
             if isinstance(pair, list | tuple) and len(pair) != 2:
                 raise ValueError(f"{name}[{index}] = {show(pair)}, allowed: {allowed}")
+
+
+def shallowest(names: Iterable[str]) -> list[str]:
+    """Return the dotted names with the fewest parts, each once.
+
+    Examples
+    --------
+    >>> shallowest(["scenario.leader.learner.ridge", "learner.ridge"])
+    ['learner.ridge']
+    """
+    depths = {name: name.count(".") for name in names}
+    return [name for name, depth in depths.items() if depth == min(depths.values())]

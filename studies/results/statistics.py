@@ -118,7 +118,8 @@ def bootstrap(
     if n_runs < FEW:
         half = t * np.sqrt(array.var(axis=0, ddof=1) / n_runs)
         equal = (array == array[0]).all(axis=0)
-        half = np.where(equal & (value > bounds[0]) & (value < bounds[1]), np.nan, half)
+        inside = (value > bounds[0]) & (value < bounds[1]) | ~np.isfinite(bounds).all()
+        half = np.where(equal & inside, np.nan, half)
         low, high = value - half, value + half
     else:
         tail = special.ndtr(-t * math.sqrt(n_runs / (n_runs - 1)))

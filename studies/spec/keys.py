@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from ...core.functions.settings import FunctionSettings
 from ...core.plugins.settings import Settings
-from ...core.plugins.words import expect, near
+from ...core.plugins.words import expect, near, shallowest
 from .conditions import ConditionSettings, Override, StageSettings
 from .presets import PRESETS
 from .schema import REGISTRIES, KeySchema, Schema
@@ -157,7 +157,7 @@ def nearest(prefix: str) -> str:
     "did you mean 'learner.decision.teammates'?"
     """
     full = dict.fromkeys(name for table in tables() for name in table.full_names)
-    ending = [name for name in full if name.endswith(f".{prefix}")]
+    ending = shallowest(name for name in full if name.endswith(f".{prefix}"))
     if ending:
         return f"did you mean {' or '.join(map(repr, ending))}?"
     names = [*dict.fromkeys(table.name for table in tables() if table.name), *full]
