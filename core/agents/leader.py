@@ -1,4 +1,4 @@
-"""Leader of a team, whose actions are options (Sutton, Precup and Singh 1999).
+"""The leader of a team. Its actions are options (Sutton, Precup and Singh 1999).
 
 A decision of a leader and what follows until its option ends is one step of a semi-Markov decision
 process. If the option lasts k decisions with rewards r_1 to r_k, the leader learns from::
@@ -27,7 +27,7 @@ INBOX = Inbox(np.zeros(1, np.int64), NO_MESSAGES, NO_MESSAGES, NO_MESSAGES)
 
 
 class LeaderView(Scenario):
-    """Spaces of a leader, for which a learner is built. `Leader` makes its steps."""
+    """States and actions of a leader, as its learner needs them. It has no episodes of its own."""
 
     agents = ("leader",)
 

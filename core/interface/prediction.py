@@ -168,7 +168,7 @@ def rewards_of(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
 
 
 class Assumptions(NamedTuple):
-    """What agents assume about bodies; where it is None, a prediction keeps its own assumption."""
+    """Assumptions of agents about bodies. None keeps the assumption of the prediction."""
 
     effects: Sequence[FloatArray] | None = None
     """Effect ``(3, w + 1)`` of the wheel speeds on the twist, by body."""

@@ -204,7 +204,7 @@ class Sources:
         text = module_text(module)
         if self._brought_by is not None and not is_trusted(text):
             raise ValueError(
-                f"{module}: named by {self._brought_by}, but never imported by a spec of yours. "
+                f"{module}: named by {self._brought_by}; no spec of yours has imported it. "
                 "Imported code has all your permissions; --trust imports it"
             )
         if not self._was_sent:
@@ -262,7 +262,7 @@ class Sources:
             return sys.modules[key]
         if name in self._brought and not is_trusted(text):
             raise ValueError(
-                f"{name}: came with {self._brought[name]}, but was never run by a spec of yours. "
+                f"{name}: came with {self._brought[name]}; no spec of yours has run it. "
                 "It would have all your permissions; --trust runs it"
             )
         if not self._was_sent:

@@ -82,9 +82,9 @@ class ExactEnumeration(Aggregation):
         self.check_budget(exact_joint_actions(problem))
         self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
         self._offsets: list[IntArray] = []
-        """By agent, the part of the index of a joint action that it and those below choose."""
+        """For each agent, contributions of its own and lower actions to the joint-action index."""
         self._given_strides: list[IntArray] = []
-        """By agent, weights ``(n,)`` of the other actions in the index."""
+        """For each agent, index strides ``(n,)`` of the actions of all others, else 0."""
         self._means: tuple[tuple[object, ...], FloatArray] | None = None
         self._uses_tables = self.hierarchy.count_joint_actions(a) >= a**n
         if self._uses_tables:

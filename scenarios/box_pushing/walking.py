@@ -16,12 +16,13 @@ from shapely.geometry.polygon import orient
 
 from ...core.numerics import FloatArray, IntArray, njit, wrap, wrap_one
 from ..angles import angle_of, rotate
+from .prediction.twists import displacement
 from .scenario import BoxPushing
 from .world.boxes import BoxSpec
 from .world.robots import nominal_effect, side_actions
 
 Pose = tuple[float, float, float]
-"""Position [m, m] and heading [rad], or other three numbers of a robot."""
+"""Position [m, m] and heading [rad]; also places and errors of robots, see `errors_of`."""
 GAP_M = 0.04
 """Distance of walking robots from the box [m]."""
 CLEARANCE_M = 0.012
@@ -227,11 +228,8 @@ def _moved(wheels: Wheels, pose: Pose, speeds: FloatArray, action: int, out: Flo
         ahead += wheels.effect[0, w] * out[w]
         left += wheels.effect[1, w] * out[w]
         turn += wheels.effect[2, w] * out[w]
-    half = 0.5 * turn * wheels.period
-    chord = wheels.period * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
-    middle = pose[2] + half
-    dx, dy = rotate(np.cos(middle), np.sin(middle), chord * ahead, chord * left)
-    return pose[0] + dx, pose[1] + dy, pose[2] + 2.0 * half
+    dx, dy, turned = displacement(pose[2], (ahead, left, turn), wheels.period)
+    return pose[0] + dx, pose[1] + dy, pose[2] + turned
 
 
 @njit(cache=True)

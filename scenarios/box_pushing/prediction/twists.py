@@ -12,15 +12,22 @@ Twist = tuple[float, float, float]
 
 
 @njit(cache=True, forceinline=True)
-def move(pose: FloatArray, twist: Twist, seconds: float) -> None:
-    """Move a pose ``(3,)`` along the arc of a twist."""
+def displacement(heading: float, twist: Twist, seconds: float) -> Twist:
+    """Return the motion (x, y [m], turn [rad]) along the arc of a twist."""
     half = 0.5 * twist[2] * seconds
     chord = seconds * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
-    cos, sin = np.cos(pose[2] + half), np.sin(pose[2] + half)
+    cos, sin = np.cos(heading + half), np.sin(heading + half)
     dx, dy = rotate(cos, sin, chord * twist[0], chord * twist[1])
+    return dx, dy, 2.0 * half
+
+
+@njit(cache=True, forceinline=True)
+def move(pose: FloatArray, twist: Twist, seconds: float) -> None:
+    """Move a pose ``(3,)`` along the arc of a twist."""
+    dx, dy, turn = displacement(pose[2], twist, seconds)
     pose[0] += dx
     pose[1] += dy
-    pose[2] += 2.0 * half
+    pose[2] += turn
 
 
 @njit(cache=True)

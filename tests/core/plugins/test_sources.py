@@ -98,7 +98,7 @@ def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -
     copies.mkdir(parents=True)
     (copies / "links.py").write_text("LINKS = 3")
     with pytest.raises(
-        ValueError, match=r"^links\.py: came with .*out, but was never run by a spec of yours"
+        ValueError, match=r"^links\.py: came with .*out; no spec of yours has run it"
     ):
         Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS")
     trust.trust("LINKS = 3")
