@@ -8,12 +8,13 @@ robots within reach count.
 
 from __future__ import annotations
 
-from math import log, pi
+from math import log
 
 import numpy as np
 
 from ...core.numerics import BoolArray, FloatArray, wrap
 from .prediction.predictors import push_model
+from .prediction.twists import moved
 from .scenario import BoxPushing
 from .world.boxes import BoxSpec
 from .world.geometry import distances
@@ -87,7 +88,7 @@ class Drivers:
         """
         now = speeds[self.wheels[robot]][None]
         depth = int(log(MAX_SEQUENCES) / log(len(self.choices)))
-        span = self.robot.radius + self.robot.radius + CLEARANCE
+        span = 2.0 * self.robot.radius + CLEARANCE
         within = span + depth * self.seconds * self.robot.max_speed
         near = np.hypot(*(robots[:, :2] - robots[robot, :2]).T) < within
         near[robot] = False
@@ -104,7 +105,7 @@ class Drivers:
             now = after[row, option]
             twists = twists[row, option]
             for _ in range(2):
-                poses = move(poses, twists, self.seconds / 2)
+                poses = moved(poses, twists, self.seconds / 2)
                 apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
                 cost = cost + 10.0 * np.maximum(span - apart, 0.0).sum(axis=1)
                 path = paths(poses, target[:2], box, self.box, self.robot.radius + CLEARANCE)
@@ -120,17 +121,6 @@ def _distinct(speeds: FloatArray) -> BoolArray:
     same = (by_wheel[..., None] == by_wheel[:, :, None]).all(axis=0)
     first: BoolArray = same.argmax(axis=2) == np.arange(speeds.shape[1])
     return first
-
-
-def move(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
-    """Return poses ``(m, 3)`` after moving with constant body twists ``(m, 3)``."""
-    turn = twists[:, 2] * seconds
-    middle = poses[:, 2] + turn / 2
-    chord = seconds * np.sinc(turn / (2 * pi))
-    cos, sin = np.cos(middle), np.sin(middle)
-    x = poses[:, 0] + chord * (cos * twists[:, 0] - sin * twists[:, 1])
-    y = poses[:, 1] + chord * (sin * twists[:, 0] + cos * twists[:, 1])
-    return np.stack([x, y, poses[:, 2] + turn], axis=1)
 
 
 def paths(

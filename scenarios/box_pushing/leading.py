@@ -155,20 +155,18 @@ class LedBoxPushing(BoxPushing):
 
     def __init__(self, settings: BoxPushingSettings) -> None:
         super().__init__(settings)
-        self._options = BoxOptions(self)
-        self.options = self._options
+        self.options = BoxOptions(self)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode, see `BoxPushing.reset`."""
-        self._options.reset()
+        self.options.reset()
         return super().reset(seed, episode)
 
     def environments(self, count: int) -> None:
         """Return None: a leader leads in one environment."""
 
     def _measured(self, distance: float, orientation: float) -> dict[str, object]:
-        options = {"options": self._options.count}
-        return super()._measured(distance, orientation) | options
+        return super()._measured(distance, orientation) | {"options": self.options.count}
 
 
 def built(settings: BoxPushingSettings) -> BoxPushing:

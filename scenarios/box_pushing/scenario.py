@@ -105,9 +105,6 @@ class BoxPushing(Scenario):
         self.space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
         self._unit_speeds = settings.speed_increment * self._limits
-        self._period = settings.period
-        self._is_noisy = settings.infrared.noise > 0.0
-        self._pays_robots = settings.reward.of == "robot"
         self.state_space = self.space.space
         self.nominal_effects = (nominal_effect(self.robot),) * settings.robots
         """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
@@ -123,10 +120,17 @@ class BoxPushing(Scenario):
         self.task = Task.of(
             reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
         )
-        self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
-        self._prediction = PredictionSettings(
+        self._prediction = self._shared_settings()
+        self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
+        # Robots that do not fit around the box are refused now, not in the middle of a study.
+        BoxPushing.reset(self, 0)
+
+    def _shared_settings(self) -> PredictionSettings:
+        """Return the settings that all predictions share."""
+        settings = self.settings
+        return PredictionSettings(
             groups=self.groups,
-            belief=self._belief,
+            belief=PushBelief.of(self._model, self.world.robots, settings.belief.stiffness),
             space=self.space,
             action_set=self.action_set,
             increments=self._unit_speeds,
@@ -136,9 +140,6 @@ class BoxPushing(Scenario):
             period=settings.period,
             horizon=settings.prediction_horizon * CONTROL_PERIOD,
         )
-        self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        # Robots that do not fit around the box are refused now, not in the middle of a study.
-        BoxPushing.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
         """Return the opposite wheel of every wheel, or itself if it is in the middle.
@@ -195,19 +196,20 @@ class BoxPushing(Scenario):
         moved = working_seconds()
         present = self._present(before[0])
         states = self.states_at(present, self.commanded_speeds[None])[0]
-        readings = self.world.infrared()
-        if self._is_noisy:
-            readings = self.settings.infrared.noisy(readings, self._sensing)
-        distance, approach, turn = progress_of(present._replace(goal=self.goal))
+        readings = self.settings.infrared.noisy(self.world.infrared(), self._sensing)
+        if self.aim is not self.goal:  # a leader's waypoint; the reward is about the goal
+            present = present._replace(goal=self.goal)
+        distance, approach, turn = progress_of(present)
         contact = self.world.contact[None]
         strongest = np.maximum.reduce(readings, axis=1)[None]
         gained = reward(self.task, distance, approach, turn, contact, strongest)[0]
-        received = gained[self.body] if self._pays_robots else float(gained[0])
+        received = gained[self.body] if self.task.by_robot else float(gained[0])
         away = float(distance[0])
         measured = self._measured(away, float(turn[0]))
         terminated = bool(self.task.reached(distance, turn)[0])
         sensed = working_seconds()
-        twists = partial(_twists, before, self.world.poses, self._period, self.robot.radius)
+        seconds = self.settings.period
+        twists = partial(_twists, before, self.world.poses, seconds, self.robot.radius)
         if terminated:
             # The wheels stop; the box may leave the tolerance before it comes to rest.
             self._advance(np.zeros(len(self.agents)))
@@ -352,19 +354,10 @@ class BoxPushing(Scenario):
 
         `speeds` are those commanded ``(m, n)`` [m/s].
         """
-        shared = self.space.shared(batch, range(len(self.groups))).swapaxes(0, 1)
-        m, n_robots, _ = shared.shape
-        n_own = self.state_space.n_own
-        poses = batch.robots.transpose(2, 0, 1)
-        boxes = batch.boxes.T
-        if self.space.own_needs_pose:
-            poses = poses[:, self.body]
-            boxes = np.repeat(boxes, len(self.agents), axis=0)
-        states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
-        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), boxes, self.aim)
-        states[..., :n_own] = own.reshape(*states.shape[:3], -1)
-        states[..., n_own:] = shared[:, :, None]
-        return states.reshape(*speeds.shape, -1)
+        own = self.space.own_of_all(batch, speeds.T)
+        shared = self.space.shared(batch, range(len(self.groups)))[self.body]
+        states = np.concatenate([own, shared], axis=2)
+        return np.ascontiguousarray(states.swapaxes(0, 1))
 
 
 class BoxEnvironments(StackedEnvironments[BoxPushing]):
@@ -411,7 +404,7 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
         away, approach, turn = progress_of(batch)
         reached = one.task.reached(away, turn)
         paid = reward(one.task, away, approach, turn, gaps < TOUCHING, readings)
-        if one.settings.reward.of == "robot":
+        if one.task.by_robot:
             paid = paid[:, one.body]
         rewards = np.broadcast_to(paid, joint_actions.shape)
         return Transitions(states, rewards, reached, ~reached & (away > one.farthest))

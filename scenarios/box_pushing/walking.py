@@ -76,6 +76,17 @@ class Wheels(NamedTuple):
     """Radius of the robot [m]."""
 
 
+class Others(NamedTuple):
+    """Other robots, as a walking robot sees them."""
+
+    plans: FloatArray
+    """``(DEPTH, M, 2)`` positions of all robots after each of their planned actions [m]."""
+    near: IntArray
+    """Robots that it may meet."""
+    span: float
+    """Distance that it keeps from their centers [m]."""
+
+
 def sides_of(box: BoxSpec) -> list[HullSide]:
     """Return the sides of the convex hull of a box, counterclockwise.
 
@@ -279,6 +290,60 @@ def _crowding(x: float, y: float, others: FloatArray, near: IntArray, span: floa
 
 
 @njit(cache=True)
+def _search(
+    pose: FloatArray,
+    speeds: FloatArray,
+    place: Pose,
+    others: Others,
+    path: Path,
+    wheels: Wheels,
+) -> tuple[int, FloatArray]:
+    """Return the first action of the best sequence, and the poses ``(DEPTH, 3)`` after each action.
+
+    The search goes depth first; it leaves a sequence as soon as it costs more than the best one.
+    """
+    n_actions = len(wheels.gains)
+    trail = np.empty((DEPTH + 1, 3))
+    reached = np.empty((DEPTH + 1, len(speeds)))
+    costs = np.zeros(DEPTH + 1)
+    actions = np.empty((DEPTH, n_actions), np.int64)
+    counts = np.empty(DEPTH, np.int64)
+    tried = np.zeros(DEPTH, np.int64)
+    trail[0] = pose
+    reached[0] = speeds
+    counts[0] = len(_distinct(wheels, speeds, actions[0]))
+    best = np.inf
+    best_action = 0
+    best_trail = trail[1:]
+    level = 0
+    while level >= 0:
+        if tried[level] == counts[level]:
+            level -= 1
+            continue
+        action = actions[level, tried[level]]
+        tried[level] += 1
+        start = (trail[level, 0], trail[level, 1], trail[level, 2])
+        after = _moved(wheels, start, reached[level], action, reached[level + 1])
+        near = _crowding(after[0], after[1], others.plans[level], others.near, others.span)
+        cost = costs[level] + 10.0 * near
+        if cost >= best:
+            continue
+        is_last = level == DEPTH - 1
+        cost += (1.1 if is_last else 0.1) * _cost(path, after, place)
+        trail[level + 1, 0], trail[level + 1, 1], trail[level + 1, 2] = after
+        if not is_last:
+            level += 1
+            costs[level] = cost
+            tried[level] = 0
+            counts[level] = len(_distinct(wheels, reached[level], actions[level]))
+        elif cost < best:
+            best = cost
+            best_action = actions[0, tried[0] - 1]
+            best_trail = trail[1:].copy()
+    return best_action, best_trail
+
+
+@njit(cache=True)
 def walk(
     order: IntArray,
     poses: FloatArray,
@@ -302,48 +367,21 @@ def walk(
     path, wheels
         The curve around the box, and the commands of a robot.
     """
-    n_robots, n_wheels = speeds.shape
+    n_robots = len(speeds)
     span = 2.0 * wheels.radius + CLEARANCE_M
     reach = span + 2.0 * (DEPTH + 1) * wheels.period * wheels.limit
     plans = np.empty((DEPTH, n_robots, 2))
     for level in range(DEPTH):
         plans[level] = poses[:, :2]
-    now = np.empty((DEPTH + 1, n_wheels))
-    actions = np.empty((DEPTH, len(wheels.gains)), np.int64)
     chosen = np.zeros(n_robots, np.int64)
-    trail = np.empty((DEPTH, 2))
     for r in order:
         apart = np.sqrt((poses[:, 0] - poses[r, 0]) ** 2 + (poses[:, 1] - poses[r, 1]) ** 2)
         apart[r] = np.inf
-        near = np.nonzero(apart < reach)[0]
+        others = Others(plans, np.nonzero(apart < reach)[0], span)
         place = (places[r, 0], places[r, 1], places[r, 2])
-        start = (poses[r, 0], poses[r, 1], poses[r, 2])
-        now[0] = speeds[r]
-        best = np.inf
-        for a in _distinct(wheels, now[0], actions[0]):
-            first = _moved(wheels, start, now[0], a, now[1])
-            cost_a = 10.0 * _crowding(first[0], first[1], plans[0], near, span)
-            cost_a += 0.1 * _cost(path, first, place)
-            for b in _distinct(wheels, now[1], actions[1]):
-                second = _moved(wheels, first, now[1], b, now[2])
-                cost_b = cost_a + 10.0 * _crowding(second[0], second[1], plans[1], near, span)
-                cost_b += 0.1 * _cost(path, second, place)
-                if cost_b >= best:
-                    continue
-                for c in _distinct(wheels, now[2], actions[2]):
-                    third = _moved(wheels, second, now[2], c, now[3])
-                    cost = cost_b + 10.0 * _crowding(third[0], third[1], plans[2], near, span)
-                    if cost >= best:
-                        continue
-                    cost += 1.1 * _cost(path, third, place)
-                    if cost < best:
-                        best = cost
-                        chosen[r] = a
-                        trail[0, 0], trail[0, 1] = first[0], first[1]
-                        trail[1, 0], trail[1, 1] = second[0], second[1]
-                        trail[2, 0], trail[2, 1] = third[0], third[1]
+        chosen[r], trail = _search(poses[r], speeds[r], place, others, path, wheels)
         for level in range(DEPTH):
-            plans[level, r] = trail[level]
+            plans[level, r, 0], plans[level, r, 1] = trail[level, 0], trail[level, 1]
     return chosen
 
 

@@ -30,6 +30,7 @@ from ...core.numerics import FloatArray
 from ...core.plugins.registry import Registry
 from ..state_variables import (
     Situations,
+    StateVariable,
     find_variable,
     freeze,
     guard,
@@ -148,7 +149,7 @@ def excess(view: ChainView, joint: Joints) -> FloatArray:
     return _length(view.goal - view.places[:-1][joint]) - lever.function(view, joint)
 
 
-BUILT_IN = ("bearing", "distance", "approach", "angle", "lever", "excess")
+BUILT_IN = [name for name, thing in [*vars().items()] if isinstance(thing, StateVariable)]
 CHAIN_VARIABLES = Registry("chain variable", {name: f"{__name__}:{name}" for name in BUILT_IN})
 """State variables by the name that specs use."""
 

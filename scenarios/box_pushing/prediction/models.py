@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from ....core.numerics import FloatArray
 from ..world.geometry import BoxShape
 
@@ -14,14 +12,11 @@ class LearnedPush(NamedTuple):
     """Weights of learned pushing; lengths of turning are the friction radius and the radius."""
 
     period: float
-    """Duration of a decision [s]; 0: nothing is learned."""
+    """Duration of a decision [s]."""
     box: FloatArray
     """``(6, 3)`` twist of the box per sum of contacts."""
     robot: FloatArray
     """``(7, 3)`` deflection of a robot per feature."""
-
-
-NOTHING_LEARNED = LearnedPush(0.0, np.zeros((6, 3)), np.zeros((7, 3)))
 
 
 class PushModel(NamedTuple):
@@ -38,5 +33,6 @@ class PushModel(NamedTuple):
     """Maximum ground friction of the box, F [N]."""
     contact_friction: float
     """Coefficient of friction between robot and box."""
-    learned: LearnedPush = NOTHING_LEARNED
-    """Learned weights that replace all constants but the geometry, see `poses`."""
+    learned: LearnedPush | None = None
+    """Learned weights that replace all constants except the geometry, see `poses`. Without them the
+    type of a model differs, so that kernels are compiled without learned pushing."""

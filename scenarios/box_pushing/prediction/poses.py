@@ -21,8 +21,8 @@ import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
 from ...angles import rotate
-from ..world.geometry import NEAREST, ON_SURFACE_M, nearest_points
-from .models import PushModel
+from ..world.geometry import NEAREST, ON_SURFACE_M, Records, gaps, locate
+from .models import LearnedPush, PushModel
 from .twists import Twist, mean_twists, move
 
 TWIST_SIGNS = np.array([1.0, -1.0, -1.0])
@@ -31,9 +31,6 @@ BOX_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Signs of the features of the box in a mirror image."""
 ROBOT_SIGNS = np.array([1.0, -1.0, 1.0, -1.0, -1.0, -1.0, 1.0])
 """Signs of the features of a robot in a mirror image."""
-
-Records = np.ndarray[tuple[int], np.dtype[np.void]]
-"""Records of nearest points."""
 
 
 @njit(cache=True)
@@ -44,13 +41,14 @@ def push_by_weights(
     choices: IntArray,
     seconds: float,
     model: PushModel,
+    learned: LearnedPush,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Predict poses by learned weights; see `push` for arguments and results."""
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     poses, commands, contacts = np.empty((n + 1, 3)), np.empty((n, 3)), np.empty((n, 8))
     blocks = np.zeros(1, NEAREST)
-    learned, rho = model.learned, model.shape.friction_radius
+    rho = model.shape.friction_radius
     for c in range(m):
         poses[0] = box
         poses[1:] = robots
@@ -66,10 +64,8 @@ def push_by_weights(
                 twist = command[0] + x, command[1] + y, command[2] + turn / model.radii[r]
                 move(poses[r + 1], twist, learned.period)
         out_box[:, c] = poses[0]
-        for r in range(n):
-            out_robots[r, :, c] = poses[r + 1]
-            _locate(poses[r + 1], poses[0], model, blocks)
-            out_gaps[r, c] = blocks[0].distance[0] - model.shape.radius - model.radii[r]
+        out_robots[:, :, c] = poses[1:]
+        out_gaps[:, c] = gaps(poses[1:], poses[0], model.shape, model.radii)
     return out_robots, out_box, out_gaps
 
 
@@ -113,15 +109,6 @@ def samples_of(
 
 
 @njit(cache=True)
-def _locate(pose: FloatArray, box: FloatArray, model: PushModel, blocks: Records) -> None:
-    """Write the position of a robot in the frame of the box, and the nearest point of the box."""
-    cos, sin = np.cos(box[2]), np.sin(box[2])
-    x, y = rotate(cos, -sin, pose[0] - box[0], pose[1] - box[1])
-    blocks[0].x[0], blocks[0].y[0] = x, y
-    nearest_points(model.shape.edges, blocks[0], 1)
-
-
-@njit(cache=True)
 def _touch(
     poses: FloatArray,
     commands: FloatArray,
@@ -138,7 +125,8 @@ def _touch(
         pose, twist, radius = poses[r + 1], commands[r], model.radii[r]
         free[:] = pose
         move(free, (twist[0], twist[1], twist[2]), seconds)
-        _locate(free, box, model, blocks)
+        x, y = rotate(cos, -sin, free[0] - box[0], free[1] - box[1])
+        locate(x, y, shape.edges, near)
         depth = radius + shape.radius - near.distance[0]
         if depth <= 0.0:
             contacts[r] = 0.0

@@ -135,7 +135,8 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         """Return the situations after robot actions ``(M, m)``."""
         now = self.situation
         twists = self.wheel_commands.twists
-        robots, box, gaps = push(now.robots, now.box, twists, actions, seconds, self.model)
+        learned = self.model.learned
+        robots, box, gaps = push(now.robots, now.box, twists, actions, seconds, self.model, learned)
         return self._batch(robots, box, gaps, seconds)
 
     def _batch(
@@ -241,7 +242,13 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         twists = self.wheel_commands.twists[only]
         actions = np.arange(twists.shape[1])[None]
         robots, boxes, _ = push(
-            now.robots[only], now.box, twists, actions, self.settings.horizon, model
+            now.robots[only],
+            now.box,
+            twists,
+            actions,
+            self.settings.horizon,
+            model,
+            model.learned,
         )
         return robots[0].T, boxes.T
 
@@ -262,14 +269,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         actions, batch = self._at_horizon(joint_actions)
         space = self.settings.space
         speeds = speeds_of(actions, self.wheel_commands.speeds)
-        poses: FloatArray = np.zeros((0, 3))
-        boxes = poses
-        if space.own_needs_pose:
-            of_robots = batch.robots.transpose(0, 2, 1)
-            poses = np.repeat(of_robots, len(speeds) // len(of_robots), axis=0).reshape(-1, 3)
-            boxes = np.tile(batch.boxes.T, (len(speeds), 1))
-        own = space.own(poses, speeds.reshape(-1), boxes, self.situation.goal)
-        return own.reshape(*speeds.shape, -1), space.shared(batch, range(len(actions)))
+        return space.own_of_all(batch, speeds), space.shared(batch, range(len(actions)))
 
     def poses(self, joint_actions: IntArray) -> SituationBatch:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""

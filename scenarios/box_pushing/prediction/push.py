@@ -21,8 +21,8 @@ import numpy as np
 
 from ....core.numerics import BoolArray, FloatArray, IntArray, njit
 from ...angles import cos_sin, rotate
-from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, block_of, nearest_points
-from .models import PushModel
+from ..world.geometry import LANES, NEAREST, ON_SURFACE_M, Records, block_of, nearest_points
+from .models import LearnedPush, PushModel
 from .poses import push_by_weights
 
 SUBSTEPS = 4
@@ -55,8 +55,6 @@ BOX = block_of(
     *("force_x", "force_y", "torque"),  # sum of all contacts
 )
 """The box."""
-Records = np.ndarray[tuple[int], np.dtype[np.void]]
-"""Records of several robots."""
 Compliance = tuple[float, float, float, float, float, float]
 """Upper triangle of a compliance matrix."""
 _EXACT = {"contract", "nsz"}
@@ -71,6 +69,7 @@ def push(
     choices: IntArray,
     seconds: float,
     model: PushModel,
+    learned: LearnedPush | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Predict poses after `seconds` for ``m`` combinations of robot twists.
 
@@ -88,14 +87,17 @@ def push(
         Duration of the push [s].
     model
         Model of robots and box.
+    learned
+        Learned weights of the model, an argument of its own because the type of an argument decides
+        which branch is compiled.
 
     Returns
     -------
     robots, box, gaps : FloatArray
         Robot poses ``(M, 3, m)``, box poses ``(3, m)`` and gaps ``(M, m)`` [m].
     """
-    if model.learned.period > 0.0:
-        return push_by_weights(robots, box, twists, choices, seconds, model)
+    if learned is not None:
+        return push_by_weights(robots, box, twists, choices, seconds, model, learned)
     n, m = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
     bodies, boxes, blocks = np.zeros(n, ROBOT), np.zeros(1, BOX), np.zeros(1, NEAREST)
@@ -186,7 +188,7 @@ def _locate(robot: np.record, box: np.record, near: np.record, edges: FloatArray
     for k in range(LANES):
         dx, dy = robot.x[k] - box.x[k], robot.y[k] - box.y[k]
         near.x[k], near.y[k] = rotate(box.cos[k], -box.sin[k], dx, dy)
-    nearest_points(edges, near, LANES)
+    nearest_points(edges, near)
 
 
 @njit(cache=True, forceinline=True)

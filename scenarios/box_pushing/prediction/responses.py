@@ -17,7 +17,7 @@ from ....core.numerics import FloatArray, IntArray, njit
 from ....core.search.drawing import choose_action, draw
 from ....core.values.triangular import summed_values
 from ..states.situations import SituationBatch
-from ..states.variables import evaluate
+from ..states.variables import Columns, evaluate
 from .models import PushModel
 from .push import push
 from .wheel_commands import WheelCommands, robot_actions, speeds_of
@@ -43,7 +43,7 @@ class Outlook(NamedTuple):
     """Model of robots and box."""
     commands: WheelCommands
     """Commands of the robots."""
-    columns: IntArray
+    columns: Columns
     """Columns of `evaluate`."""
     values: tuple[
         tuple[FloatArray, FloatArray, FloatArray],
@@ -71,7 +71,13 @@ def _values_of(actions: IntArray, outlook: Outlook) -> FloatArray:
     """Return the mean value ``(m,)`` of robot actions ``(M, m)`` over the agents."""
     model, commands = outlook.model, outlook.commands
     robots, box, gaps = push(
-        outlook.robots, outlook.box, commands.twists, actions, outlook.seconds, model
+        outlook.robots,
+        outlook.box,
+        commands.twists,
+        actions,
+        outlook.seconds,
+        model,
+        model.learned,
     )
     origins = np.expand_dims(outlook.box, 1)
     batch = SituationBatch(robots, box, gaps, outlook.goal, origins, outlook.periods, model.shape)

@@ -31,6 +31,15 @@ def move(pose: FloatArray, twist: Twist, seconds: float) -> None:
 
 
 @njit(cache=True)
+def moved(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
+    """Return poses ``(m, 3)`` after moving with constant twists ``(m, 3)`` in their own frames."""
+    after = poses.copy()
+    for i in range(len(poses)):
+        move(after[i], (twists[i, 0], twists[i, 1], twists[i, 2]), seconds)
+    return after
+
+
+@njit(cache=True)
 def twist_between(before: FloatArray, after: FloatArray, seconds: float, out: FloatArray) -> None:
     """Write the constant twist ``(3,)`` in its own frame that leads from one pose to another."""
     half = 0.5 * (after[2] - before[2])

@@ -46,19 +46,20 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray) -> WheelCommand
     alike = np.zeros((n, count), np.int64)
     for r in range(n):
         for c in range(count):
-            twists[r, c] = effects[r, :, w]
             place = count
             for j in range(w):
                 place //= n_actions
                 action = c // place % n_actions
                 speed = commands[r, j, action]
                 speeds[r, c, j] = speed
-                for i in range(3):
-                    twists[r, c, i] += effects[r, i, j] * speed
                 first = 0
                 while commands[r, j, first] != speed:
                     first += 1
                 alike[r, c] += first * place
+            for i in range(3):  # an assignment of slices would take a second longer to compile
+                twists[r, c, i] = effects[r, i, w]
+                for j in range(w):
+                    twists[r, c, i] += effects[r, i, j] * speeds[r, c, j]
     return WheelCommands(speeds, twists, alike)
 
 

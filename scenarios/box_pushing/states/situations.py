@@ -157,13 +157,13 @@ def _face_directions(
     blocks = np.zeros(1, NEAREST)
     for first in range(0, len(x), LANES):
         near = blocks[0]
-        lanes = min(LANES, len(x) - first)
-        for k in range(lanes):
-            s = first + k
+        used = min(LANES, len(x) - first)
+        for k in range(LANES):  # unused lanes repeat the last situation
+            s = first + min(k, used - 1)
             cos, sin = np.cos(boxes[2, s]), np.sin(boxes[2, s])
             near.x[k], near.y[k] = rotate(cos, -sin, x[s] - boxes[0, s], y[s] - boxes[1, s])
-        nearest_points(edges, near, lanes)
-        for k in range(lanes):
+        nearest_points(edges, near)
+        for k in range(used):
             side = 1.0 if near.distance[k] > 0.0 else -1.0
             dx, dy = side * (near.near_x[k] - near.x[k]), side * (near.near_y[k] - near.y[k])
             out[first + k] = boxes[2, first + k] + angle_of(dx, dy)

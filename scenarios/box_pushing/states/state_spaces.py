@@ -5,18 +5,19 @@ variables are those of `variables`. A spec chooses a state space of `STATE_SPACE
 shared variables, built in or of its own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
+from typing import Literal
 
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
-from ....core.numerics import FloatArray, IntArray, wrap
+from ....core.numerics import FloatArray, wrap
 from ...state_variables import StateVariable, find_variable, space_of
 from .situations import SituationBatch, whole_batch
-from .variables import STATE_VARIABLES, columns_of, evaluate
+from .variables import STATE_VARIABLES, Columns, columns_of, evaluate
 
 
 @dataclass(frozen=True)
@@ -25,15 +26,13 @@ class BoxStateSpace:
 
     space: StateSpace
     """Names, ranges and membership centers."""
-    own: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
-    """``own(poses (m, 3), speeds (m,), boxes (m, 3), goal (3,)) -> (m, n_own)``."""
-    own_needs_pose: bool
-    """Whether `own` depends on the poses of robots and box."""
+    target: Literal["box", "goal"] | None
+    """Target of the own variables of Eq. 1; None if the wheel speed is the only own variable."""
     variables: tuple[StateVariable, ...]
     """The shared variables, in order."""
 
     @cached_property
-    def columns(self) -> IntArray:
+    def columns(self) -> Columns:
         """Columns of `evaluate`, one for each shared variable."""
         return columns_of(self.variables)
 
@@ -41,6 +40,44 @@ class BoxStateSpace:
     def is_built_in(self) -> bool:
         """Whether all shared variables are built in."""
         return all(variable.trusted for variable in self.variables)
+
+    @property
+    def own_needs_pose(self) -> bool:
+        """Whether own variables depend on the poses of robots and box."""
+        return self.target is not None
+
+    def own(
+        self, poses: FloatArray, speeds: FloatArray, boxes: FloatArray, goal: FloatArray
+    ) -> FloatArray:
+        """Return the own variables ``(m, n_own)`` of agents.
+
+        Parameters
+        ----------
+        poses, boxes
+            ``(m, 3)`` of the robot and the box; anything unless `own_needs_pose`.
+        speeds
+            ``(m,)`` wheel speeds [m/s].
+        goal
+            ``(3,)`` goal pose of the box.
+        """
+        if self.target is None:
+            return speeds[:, None]
+        target = boxes if self.target == "box" else goal
+        x, y = (target[..., :2] - poses[:, :2]).T
+        heading = poses[:, 2]
+        bearing = wrap(np.arctan2(y, x) - heading)
+        return np.stack([wrap(heading), bearing, np.hypot(x, y), speeds], axis=1)
+
+    def own_of_all(self, batch: SituationBatch, speeds: FloatArray) -> FloatArray:
+        """Return the own variables ``(n, m, n_own)`` of all agents, given speeds ``(n, m)``."""
+        n, _ = speeds.shape
+        poses = boxes = batch.boxes.T
+        if self.own_needs_pose:
+            robots = batch.robots.transpose(0, 2, 1)
+            poses = np.repeat(robots, n // len(robots), axis=0).reshape(-1, 3)
+            boxes = np.tile(boxes, (n, 1))
+        own = self.own(poses, speeds.reshape(-1), boxes, batch.goal)
+        return own.reshape(*speeds.shape, -1)
 
     def shared(self, batch: SituationBatch, robots: Sequence[int]) -> FloatArray:
         """Return the shared variables ``(k, m, d - n_own)`` of k robots in m situations.
@@ -59,26 +96,6 @@ class BoxStateSpace:
                         values = variable.function(situation, situation.robots[robot])
                         out[k, :, column] = variable.checked(values, batch.boxes.shape[1])
         return out
-
-
-def _own_toward_goal(
-    poses: FloatArray, speeds: FloatArray, boxes: FloatArray, goal: FloatArray
-) -> FloatArray:
-    return _own_of_paper(poses, speeds, goal)
-
-
-def _own_toward_box(
-    poses: FloatArray, speeds: FloatArray, boxes: FloatArray, goal: FloatArray
-) -> FloatArray:
-    return _own_of_paper(poses, speeds, boxes)
-
-
-def _own_of_paper(poses: FloatArray, speeds: FloatArray, target: FloatArray) -> FloatArray:
-    """Return theta_i, phi_i, d_i and omega_i of Eq. 1 with respect to a target ``(..., 3)``."""
-    x, y = (target[..., :2] - poses[:, :2]).T
-    heading = poses[:, 2]
-    bearing = wrap(np.arctan2(y, x) - heading)
-    return np.stack([wrap(heading), bearing, np.hypot(x, y), speeds], axis=1)
 
 
 _EVEN = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))
@@ -103,12 +120,7 @@ def build_space(name: str, *shared: str) -> BoxStateSpace:
         If there is none, one is unknown or named twice.
     """
     variables = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
-    return BoxStateSpace(
-        space_of(name, _SPEED, variables),
-        lambda poses, speeds, boxes, goal: speeds[:, None],
-        own_needs_pose=False,
-        variables=variables,
-    )
+    return BoxStateSpace(space_of(name, _SPEED, variables), None, variables)
 
 
 def _space_of_paper(name: str) -> BoxStateSpace:
@@ -134,8 +146,7 @@ def _space_of_paper(name: str) -> BoxStateSpace:
     described = (*angles, goal_distance, _SPEED, *(each.variable for each in shared))
     common = tuple(each.variable.name for each in shared)
     space = StateSpace(name, described, n_own=4, common=common)
-    own = _own_toward_box if is_box else _own_toward_goal
-    return BoxStateSpace(space, own, own_needs_pose=True, variables=shared)
+    return BoxStateSpace(space, "box" if is_box else "goal", shared)
 
 
 _PROGRESS = ("box_distance", "approach")

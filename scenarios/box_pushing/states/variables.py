@@ -20,6 +20,7 @@ The *course* is the direction from the box to the goal.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -290,84 +291,127 @@ def box_goal_bearing(situation: Situation, robot: Robot) -> float:
 _BUILT_IN = {name: thing for name, thing in [*vars().items()] if isinstance(thing, StateVariable)}
 STATE_VARIABLES = Registry("state variable", {name: f"{__name__}:{name}" for name in _BUILT_IN})
 """State variables by the name that specs use."""
-_INDEX = {name: index for index, name in enumerate(_BUILT_IN)}
 
+
+@njit(cache=True, forceinline=True, fastmath={"contract", "nsz"})
+def _situation(
+    boxes: FloatArray,
+    goal: FloatArray,
+    origins: FloatArray,
+    constants: tuple[float, float, int],
+    summary: FloatArray,
+    near: FloatArray,
+    s: int,
+) -> Situation:
+    """Return situation s of a batch: the numbers that state variables read."""
+    first = s if origins.shape[1] > 1 else 0
+    periods, friction_radius, n_robots = constants
+    return Situation(
+        (boxes[0, s], boxes[1, s], boxes[2, s]),
+        (goal[0], goal[1], goal[2]),
+        (origins[0, first], origins[1, first], origins[2, first]),
+        periods,
+        friction_radius,
+        n_robots,
+        summary[0, s],
+        summary[1, s],
+        (summary[2, s], summary[3, s]),
+        summary[4, s],
+        (summary[5, s], summary[6, s]),
+        (near[0, s], near[1, s]),
+        near[2, s],
+        (),
+    )
+
+
+@njit(cache=True, forceinline=True, fastmath={"contract", "nsz"})
+def _robot(poses: FloatArray, gaps: FloatArray, near: FloatArray, r: int, i: int, s: int) -> Robot:
+    """Return robot r of situation s, which is the one of number i to be evaluated."""
+    return Robot(poses[r, 0, s], poses[r, 1, s], poses[r, 2, s], gaps[r, s], near[3 + i, s])
+
+
+Columns = tuple[int | None, ...]
+"""Number of columns; whether `Situation.contact` is needed, else None; then the column of every
+built-in variable, or None."""
 
 _TEMPLATE = """
-def evaluate(batch, robots, columns):
+def _evaluate(batch, robots, width, contact, {columns}):
     poses, boxes, gaps, goal, origins, periods, shape = batch
     count, _, m = poses.shape
     summary, values = summarize(batch), np.empty(m)
     near = np.zeros((3 + len(robots), m))
-    for column in columns:
-        if column in {need_contact}:
-            near = contacts_of(batch, robots)
-            break
-    out = np.empty((len(robots), m, len(columns)))
-    for c in range(len(columns)):
-        for i in range(len(robots)):
-            r, column = robots[i], columns[c]
-            {branches}
-            for s in range(m):
-                out[i, s, c] = values[s]
+    if contact is not None:
+        near = contacts_of(batch, robots)
+    out = np.empty((len(robots), m, width))
+    constants = periods, shape.friction_radius, count
+    {branches}
     return out
 """
-_BRANCH = """if column == {index}{once}:
+_BRANCH = """if {name}_column is not None:
+        for i in range(len(robots)):
+            r = robots[i]
+            if {is_computed}:
                 for s in range(m):
-                    first = s if origins.shape[1] > 1 else 0
                     values[s] = {name}(
-                        Situation(
-                            (boxes[0, s], boxes[1, s], boxes[2, s]),
-                            (goal[0], goal[1], goal[2]),
-                            (origins[0, first], origins[1, first], origins[2, first]),
-                            periods, shape.friction_radius, count, summary[0, s], summary[1, s],
-                            (summary[2, s], summary[3, s]), summary[4, s],
-                            (summary[5, s], summary[6, s]),
-                            (near[0, s], near[1, s]), near[2, s], (),
-                        ),
-                        Robot(poses[r, 0, s], poses[r, 1, s], poses[r, 2, s], gaps[r, s],
-                              near[3 + i, s]),
+                        _situation(boxes, goal, origins, constants, summary, near, s),
+                        _robot(poses, gaps, near, r, i, s),
                     )
-            """
+            for s in range(m):
+                out[i, s, {name}_column] = values[s]
+    """
 
 
-def _write_kernel() -> Callable[[SituationBatch, IntArray, IntArray], FloatArray]:
-    """Write the kernel that calls the built-in functions; numba cannot call them from a list."""
+def _write_kernel() -> Callable[..., FloatArray]:
+    """Write the kernel that calls the built-in functions; numba cannot call them from a list.
+
+    Every column is an argument. Where it is None, its type, numba compiles nothing of the branch.
+    """
     branches = [
-        _BRANCH.format(index=_INDEX[name], name=name, once=" and i == 0" * variable.common)
+        _BRANCH.format(name=name, is_computed="i == 0" if variable.common else "True")
         for name, variable in _BUILT_IN.items()
     ]
-    need_contact = tuple(_INDEX[name] for name in sorted(_NEED_CONTACT))
-    source = _TEMPLATE.format(need_contact=need_contact, branches="".join(branches))
-    functions = {name: variable.function for name, variable in _BUILT_IN.items()}
-    names: dict[str, Any] = {
-        "__name__": __name__,
-        "np": np,
-        "Robot": Robot,
-        "Situation": Situation,
-        "summarize": summarize,
-        "contacts_of": contacts_of,
-        **functions,
-    }
+    source = _TEMPLATE.format(
+        columns=", ".join(f"{name}_column" for name in _BUILT_IN),
+        branches="".join(branches),
+    )
+    names: dict[str, Any] = {name: variable.function for name, variable in _BUILT_IN.items()}
+    names |= {"__name__": __name__, "np": np, "_situation": _situation, "_robot": _robot}
+    names |= {"summarize": summarize, "contacts_of": contacts_of}
     exec(compile(source, __file__, "exec"), names)
-    return njit(cache=True, fastmath={"contract", "nsz"})(names["evaluate"])
+    return njit(cache=True, fastmath={"contract", "nsz"})(names["_evaluate"])
 
 
-evaluate = _write_kernel()
-"""Kernel ``evaluate(batch, robots (k,), columns (c,)) -> (k, m, c)`` of built-in variables.
-
-Columns are indices that `columns_of` gives. Where one is -1, the values mean nothing. Loops over
-situations are the inner ones, because the compiler turns them into vector instructions.
-"""
+_evaluate = _write_kernel()
 
 
-def columns_of(variables: Sequence[StateVariable]) -> IntArray:
-    """Return the columns of `evaluate` that variables stand for; -1 for a user's own."""
-    return np.array([_INDEX[v.variable.name] if v.trusted else -1 for v in variables], np.int64)
+@njit(cache=True)
+def evaluate(batch: SituationBatch, robots: IntArray, columns: Columns) -> FloatArray:
+    """Return the built-in variables ``(k, m, width)`` of k robots in m situations.
+
+    Parameters
+    ----------
+    batch
+        The situations. Loops over them are the inner ones, because the compiler turns them into
+        vector instructions.
+    robots
+        ``(k,)`` indices.
+    columns
+        See `columns_of`. Columns of user-defined variables are left for them to fill.
+    """
+    return _evaluate(batch, robots, *columns)
+
+
+def columns_of(variables: Sequence[StateVariable]) -> Columns:
+    """Return the columns of built-in variables among others, see `evaluate`."""
+    places = {v.variable.name: column for column, v in enumerate(variables) if v.trusted}
+    contact = None if _NEED_CONTACT.isdisjoint(places) else True
+    return (len(variables), contact, *map(places.get, _BUILT_IN))
 
 
 _FIRST = np.zeros(1, np.int64)
-_PROGRESS = np.array([_INDEX[name] for name in ("box_distance", "approach", "box_turn")])
+_PROGRESS = columns_of(
+    [replace(_BUILT_IN[name], trusted=True) for name in ("box_distance", "approach", "box_turn")]
+)
 
 
 def progress_of(batch: SituationBatch) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -31,6 +31,8 @@ def block_of(*rows: str) -> np.dtype[np.void]:
     return np.dtype((np.record, [(row, np.float64, (LANES,)) for row in rows]))
 
 
+Records = np.ndarray[tuple[int], np.dtype[np.void]]
+"""Array of such records."""
 NEAREST = block_of("x", "y", "near_x", "near_y", "square", "side", "distance")
 """Points x, y, and their nearest points on the edges. The distance is negative inside."""
 
@@ -62,7 +64,7 @@ def _facing(edges: FloatArray, x: float, y: float) -> int:
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
-def _all_before(edge: FloatArray, points: np.record, lanes: int) -> bool:
+def _all_before(edge: FloatArray, points: np.record) -> bool:
     """Write the nearest points on one edge; return whether all points stand clearly before it.
 
     To these no other edge is nearer if all of the outline is behind this one.
@@ -73,7 +75,7 @@ def _all_before(edge: FloatArray, points: np.record, lanes: int) -> bool:
     scale = 1.0 / length2
     clearance = CLEAR * np.sqrt(length2)
     before = 0
-    for k in range(lanes):
+    for k in range(LANES):
         x, y = points.x[k], points.y[k]
         t = ((x - x0) * dx + (y - y0) * dy) * scale
         near_x, near_y = x0 + t * dx, y0 + t * dy
@@ -85,12 +87,12 @@ def _all_before(edge: FloatArray, points: np.record, lanes: int) -> bool:
         off = (x - x0) * dy - (y - y0) * dx
         clear = (end > 0.0) & (end * end * length2 > CLEAR * square) & (off > clearance)
         before += 1 if clear else 0
-    return before == lanes
+    return before == LANES
 
 
 @njit(cache=True, fastmath={"contract", "nsz"})
-def nearest_points(edges: FloatArray, points: np.record, lanes: int) -> None:
-    """Write the nearest points and the signed distances of some points.
+def nearest_points(edges: FloatArray, points: np.record) -> None:
+    """Write the nearest points and the signed distances of `LANES` points.
 
     Parameters
     ----------
@@ -98,13 +100,11 @@ def nearest_points(edges: FloatArray, points: np.record, lanes: int) -> None:
         Edges of a `BoxShape`.
     points
         Record of the type `NEAREST`; `x` and `y` are read, the other rows are written.
-    lanes
-        Number of points, at most `LANES`.
     """
     face = _facing(edges, points.x[0], points.y[0])
-    if face >= 0 and _all_before(edges[face], points, lanes):
+    if face >= 0 and _all_before(edges[face], points):
         return
-    for k in range(lanes):
+    for k in range(LANES):
         points.square[k] = np.inf
         points.side[k] = 1.0
     for i in range(len(edges)):
@@ -113,7 +113,7 @@ def nearest_points(edges: FloatArray, points: np.record, lanes: int) -> None:
         length2 = dx * dx + dy * dy
         scale = 1.0 / length2 if length2 > 0.0 else 0.0
         slope = dx / dy if dy != 0.0 else 0.0
-        for k in range(lanes):
+        for k in range(LANES):
             x, y = points.x[k], points.y[k]
             t = ((x - x0) * dx + (y - y0) * dy) * scale
             t = t if t > 0.0 else 0.0
@@ -127,8 +127,17 @@ def nearest_points(edges: FloatArray, points: np.record, lanes: int) -> None:
             crosses = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * slope)
             side = points.side[k]
             points.side[k] = -side if crosses else side
-    for k in range(lanes):
+    for k in range(LANES):
         points.distance[k] = points.side[k] * np.sqrt(points.square[k])
+
+
+@njit(cache=True)
+def locate(x: float, y: float, edges: FloatArray, points: np.record) -> None:
+    """Write the nearest point of one point to all lanes."""
+    for k in range(LANES):
+        points.x[k] = x
+        points.y[k] = y
+    nearest_points(edges, points)
 
 
 @njit(cache=True)
@@ -145,12 +154,12 @@ def distances(xs: FloatArray, ys: FloatArray, shape: BoxShape) -> FloatArray:
     out = np.empty(len(xs))
     for first in range(0, len(xs), LANES):
         points = blocks[0]
-        lanes = min(LANES, len(xs) - first)
-        for k in range(lanes):
-            points.x[k] = xs[first + k]
-            points.y[k] = ys[first + k]
-        nearest_points(shape.edges, points, lanes)
-        for k in range(lanes):
+        used = min(LANES, len(xs) - first)
+        for k in range(LANES):  # unused lanes repeat the last point
+            points.x[k] = xs[first + min(k, used - 1)]
+            points.y[k] = ys[first + min(k, used - 1)]
+        nearest_points(shape.edges, points)
+        for k in range(used):
             out[first + k] = points.distance[k] - shape.radius
     return out
 
@@ -162,8 +171,7 @@ def surface(shape: BoxShape, x: float, y: float) -> tuple[float, float, float]:
     On the surface the normal is not determined, and zero.
     """
     blocks = np.zeros(1, NEAREST)
-    blocks[0].x[0], blocks[0].y[0] = x, y
-    nearest_points(shape.edges, blocks[0], 1)
+    locate(x, y, shape.edges, blocks[0])
     distance = blocks[0].distance[0]
     near_x, near_y = blocks[0].near_x[0], blocks[0].near_y[0]
     scale = 1.0 / distance if abs(distance) > ON_SURFACE_M else 0.0
@@ -183,11 +191,14 @@ def gaps(robots: FloatArray, box: FloatArray, shape: BoxShape, radii: FloatArray
     radii
         ``(M,)`` radii of the robots.
     """
-    xs, ys = np.empty((2, len(robots)))
+    xs, ys = np.empty(len(robots)), np.empty(len(robots))
     cos, sin = np.cos(box[2]), np.sin(box[2])
     for r in range(len(robots)):
         xs[r], ys[r] = rotate(cos, -sin, robots[r, 0] - box[0], robots[r, 1] - box[1])
-    return distances(xs, ys, shape) - radii
+    out = distances(xs, ys, shape)
+    for r in range(len(out)):
+        out[r] -= radii[r]
+    return out
 
 
 @njit(cache=True)

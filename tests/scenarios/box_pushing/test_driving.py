@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.driving import Drivers, _distinct, move, paths
+from nested_agents.scenarios.box_pushing.driving import Drivers, _distinct, paths
+from nested_agents.scenarios.box_pushing.prediction.twists import moved
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 BOX = np.zeros(3)
@@ -44,7 +45,7 @@ def test_of_wheel_speeds_that_several_actions_give_only_the_first_is_tried() -> 
 
 def test_constant_twists_lead_along_arcs() -> None:
     start = np.array([[1.0, 2.0, np.pi / 2]] * 2)
-    straight, arc = move(start, np.array([[0.1, 0, 0], [0.1, 0, 1.0]]), np.pi / 2)
+    straight, arc = moved(start, np.array([[0.1, 0, 0], [0.1, 0, 1.0]]), np.pi / 2)
     np.testing.assert_allclose(straight, [1.0, 2.0 + 0.05 * np.pi, np.pi / 2])
     # A quarter of a circle of radius 0.1 to the left.
     np.testing.assert_allclose(arc, [0.9, 2.1, np.pi], atol=1e-12)

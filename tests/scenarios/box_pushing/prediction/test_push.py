@@ -13,13 +13,23 @@ from nested_agents.scenarios.box_pushing.prediction.models import PushModel
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance
+from nested_agents.scenarios.box_pushing.world.settings import RobotSettings, WheelSettings
 
 BOX, ROBOT = BOXES["square"], ROBOTS["e-puck"]
 BEHIND = -0.1 - ROBOT.radius
 
 
-def model(n: int, *, rigid: bool = False) -> PushModel:
-    yielding = np.zeros((3, 3)) if rigid else compliance(ROBOT)
+LOPSIDED = RobotSettings(
+    wheels=(
+        WheelSettings(name="front", x=0.03, y=0.01),
+        WheelSettings(name="back", x=-0.01, y=-0.03),
+    )
+)
+"""Robot that turns and moves to both sides under any force: its compliance has no zeros."""
+
+
+def model(n: int, *, rigid: bool = False, robot: RobotSettings = ROBOT) -> PushModel:
+    yielding = np.zeros((3, 3)) if rigid else compliance(robot)
     return PushModel(
         shape=BOX.shape,
         radii=np.full(n, ROBOT.radius),
@@ -91,11 +101,12 @@ def test_a_push_off_the_center_turns_the_box_away() -> None:
 
 
 @pytest.mark.parametrize("name", ["square", "L", "circle", "star"])
-@pytest.mark.parametrize("rigid", [False, True])
-def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
+@pytest.mark.parametrize("kind", ["e-puck", "lopsided", "rigid"])
+def test_the_lanes_compute_what_is_written(name: str, kind: str) -> None:
     rng = np.random.default_rng(0)
     box_spec = BOXES[name]
-    believed = model(3, rigid=rigid)._replace(shape=box_spec.shape)
+    robot = LOPSIDED if kind == "lopsided" else ROBOT
+    believed = model(3, rigid=kind == "rigid", robot=robot)._replace(shape=box_spec.shape)
     for count in (1, 37):
         angles = rng.uniform(-np.pi, np.pi, 3)
         distances = rng.uniform(0.8, 1.2, 3) * (box_spec.reach + ROBOT.radius)

@@ -84,8 +84,8 @@ def test_blocks_before_one_edge_have_the_bits_of_mixed_blocks(name: str, farthes
         for block in (before, mixed):
             block.x[:], block.y[:] = points.T
         mixed.x[0] = mixed.y[0] = 0.0  # inside
-        nearest_points(edges, before, LANES)
-        nearest_points(edges, mixed, LANES)
+        nearest_points(edges, before)
+        nearest_points(edges, mixed)
         for row in ("near_x", "near_y", "distance"):
             np.testing.assert_array_equal(before[row][1:], mixed[row][1:])
 
