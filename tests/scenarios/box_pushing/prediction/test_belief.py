@@ -62,7 +62,7 @@ def test_believed_are_the_worlds_own_constants_times_the_factors():
 @pytest.mark.parametrize("robot", ["e-puck", "four-wheel"])
 def test_constants_are_factors_of_what_is_believed(robot):
     world = scenario(robot=robot)
-    belief = world._belief
+    belief = world._prediction.belief
     same = model_of(belief, np.zeros(3))
     np.testing.assert_allclose(same.compliance, world._model.compliance, rtol=1e-12, atol=1e-15)
     twice = model_of(belief, np.log([2.0, 2.0, 3.0]))
@@ -79,14 +79,14 @@ def test_only_ratios_of_forces_can_be_told_by_moving():
     heavier = scenario(belief={"load": 3.0})
     constants = np.log([3.0, 3.0, 1.0])
     np.testing.assert_allclose(
-        pushed(heavier._model), pushed(model_of(usual._belief, constants)), atol=1e-12
+        pushed(heavier._model), pushed(model_of(usual._prediction.belief, constants)), atol=1e-12
     )
     assert abs(pushed(heavier._model) - pushed(usual._model)).max() > 0.005
 
 
 @pytest.mark.parametrize("turning", [0.0, 9.0, 12.3, -40.0])  # 12.3: once round
 def test_outcomes_are_the_twists_of_the_push(turning: float):
-    belief, twists = scenario()._belief, TWISTS + np.array([0.0, 0.0, turning])
+    belief, twists = scenario()._prediction.belief, TWISTS + np.array([0.0, 0.0, turning])
     constants = np.array([[0.0, 0.0, 0.0], [0.7, -0.3, 0.2]])
     found = outcomes(ROBOTS, np.zeros(3), twists, 0.512, belief, constants)
     before = np.vstack([np.zeros(3), ROBOTS])
