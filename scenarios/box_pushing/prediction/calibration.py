@@ -99,7 +99,7 @@ def outcomes(
     commanded, choices = np.expand_dims(twists, 1), np.zeros((n, 1), np.int64)
     for p in range(len(constants)):
         model = model_of(belief, constants[p])
-        after, boxes, _ = push(robots, box, commanded, choices, seconds, model, model.learned)
+        after, boxes, _ = push(robots, box, commanded, choices, seconds, model)
         twist_between(box, boxes[:, 0], seconds, moved[p, 0])
         for r in range(n):
             twist_between(robots[r], after[r, :, 0], seconds, moved[p, r + 1])

@@ -135,8 +135,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         """Return the situations after robot actions ``(M, m)``."""
         now = self.situation
         twists = self.wheel_commands.twists
-        learned = self.model.learned
-        robots, box, gaps = push(now.robots, now.box, twists, actions, seconds, self.model, learned)
+        robots, box, gaps = push(now.robots, now.box, twists, actions, seconds, self.model)
         return self._batch(robots, box, gaps, seconds)
 
     def _batch(
@@ -242,13 +241,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         twists = self.wheel_commands.twists[only]
         actions = np.arange(twists.shape[1])[None]
         robots, boxes, _ = push(
-            now.robots[only],
-            now.box,
-            twists,
-            actions,
-            self.settings.horizon,
-            model,
-            model.learned,
+            now.robots[only], now.box, twists, actions, self.settings.horizon, model
         )
         return robots[0].T, boxes.T
 

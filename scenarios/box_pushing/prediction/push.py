@@ -69,7 +69,6 @@ def push(
     choices: IntArray,
     seconds: float,
     model: PushModel,
-    learned: LearnedPush | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Predict poses after `seconds` for ``m`` combinations of robot twists.
 
@@ -87,15 +86,26 @@ def push(
         Duration of the push [s].
     model
         Model of robots and box.
-    learned
-        Learned weights of the model, an argument of its own because the type of an argument decides
-        which branch is compiled.
 
     Returns
     -------
     robots, box, gaps : FloatArray
         Robot poses ``(M, 3, m)``, box poses ``(3, m)`` and gaps ``(M, m)`` [m].
     """
+    return _push(robots, box, twists, choices, seconds, model, model.learned)
+
+
+@njit(cache=True)
+def _push(
+    robots: FloatArray,
+    box: FloatArray,
+    twists: FloatArray,
+    choices: IntArray,
+    seconds: float,
+    model: PushModel,
+    learned: LearnedPush | None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Predict as `push`; the type of the last argument decides which branch is compiled."""
     if learned is not None:
         return push_by_weights(robots, box, twists, choices, seconds, model, learned)
     n, m = choices.shape

@@ -71,13 +71,7 @@ def _values_of(actions: IntArray, outlook: Outlook) -> FloatArray:
     """Return the mean value ``(m,)`` of robot actions ``(M, m)`` over the agents."""
     model, commands = outlook.model, outlook.commands
     robots, box, gaps = push(
-        outlook.robots,
-        outlook.box,
-        commands.twists,
-        actions,
-        outlook.seconds,
-        model,
-        model.learned,
+        outlook.robots, outlook.box, commands.twists, actions, outlook.seconds, model
     )
     origins = np.expand_dims(outlook.box, 1)
     batch = SituationBatch(robots, box, gaps, outlook.goal, origins, outlook.periods, model.shape)
