@@ -326,6 +326,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "from-eight-128",
         "rounds",
         "wide",
+        "leaders",
         "peers-tuning",
         "peers-tuning-arm",
         "peers-tuning-arm-fuzzy",
