@@ -25,10 +25,10 @@ class BoxStateSpace:
 
     space: StateSpace
     """Names, ranges and membership centers."""
-    own: Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
-    """``own(poses (m, 3), speeds (m,), boxes (m, 3), goal (3,)) -> (m, n_own)``."""
+    own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    """``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``."""
     own_needs_pose: bool
-    """Whether `own` depends on the poses of robots and box."""
+    """Whether `own` depends on the poses."""
     variables: tuple[StateVariable, ...]
     """The shared variables, in order."""
 
@@ -61,21 +61,9 @@ class BoxStateSpace:
         return out
 
 
-def _own_toward_goal(
-    poses: FloatArray, speeds: FloatArray, boxes: FloatArray, goal: FloatArray
-) -> FloatArray:
-    return _own_of_paper(poses, speeds, goal)
-
-
-def _own_toward_box(
-    poses: FloatArray, speeds: FloatArray, boxes: FloatArray, goal: FloatArray
-) -> FloatArray:
-    return _own_of_paper(poses, speeds, boxes)
-
-
-def _own_of_paper(poses: FloatArray, speeds: FloatArray, target: FloatArray) -> FloatArray:
-    """Return theta_i, phi_i, d_i and omega_i of Eq. 1 with respect to a target ``(..., 3)``."""
-    x, y = (target[..., :2] - poses[:, :2]).T
+def _own_of_paper(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
+    """Return theta_i, phi_i, d_i and omega_i of Eq. 1."""
+    x, y = (goal[:2] - poses[:, :2]).T
     heading = poses[:, 2]
     bearing = wrap(np.arctan2(y, x) - heading)
     return np.stack([wrap(heading), bearing, np.hypot(x, y), speeds], axis=1)
@@ -105,21 +93,14 @@ def build_space(name: str, *shared: str) -> BoxStateSpace:
     variables = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
     return BoxStateSpace(
         space_of(name, _SPEED, variables),
-        lambda poses, speeds, boxes, goal: speeds[:, None],
+        lambda poses, speeds, goal: speeds[:, None],
         own_needs_pose=False,
         variables=variables,
     )
 
 
-def _space_of_paper(name: str) -> BoxStateSpace:
-    """Return the state of Eq. 1, in the order of its own and its shared part.
-
-    The goal of an agent is the goal of the box or, in ``paper-box``, the box itself.
-    """
-    is_box = name == "paper-box"
-    bearing_name, distance_name = (
-        ("box_bearing", "robot_box_distance") if is_box else ("goal_bearing", "goal_distance")
-    )
+def _space_of_paper() -> BoxStateSpace:
+    """Return the state of Eq. 1, in the order of its own and its shared part."""
     orientation, bearing, distance = (
         find_variable(STATE_VARIABLES, name)
         for name in ("box_orientation", "box_goal_bearing", "box_distance")
@@ -128,14 +109,13 @@ def _space_of_paper(name: str) -> BoxStateSpace:
     shared = (orientation, bearing, replace(distance, variable=coarse))
     angles = (
         Variable(name, "rad", -pi, pi, True, centers, mirrored="opposite")
-        for name, centers in (("heading", _EVEN), (bearing_name, ()))
+        for name, centers in (("heading", _EVEN), ("goal_bearing", ()))
     )
-    goal_distance = Variable(distance_name, "m", 0.0, 1.5, mirrored="same")
+    goal_distance = Variable("goal_distance", "m", 0.0, 1.5, mirrored="same")
     described = (*angles, goal_distance, _SPEED, *(each.variable for each in shared))
     common = tuple(each.variable.name for each in shared)
-    space = StateSpace(name, described, n_own=4, common=common)
-    own = _own_toward_box if is_box else _own_toward_goal
-    return BoxStateSpace(space, own, own_needs_pose=True, variables=shared)
+    space = StateSpace("paper", described, n_own=4, common=common)
+    return BoxStateSpace(space, _own_of_paper, own_needs_pose=True, variables=shared)
 
 
 _PROGRESS = ("box_distance", "approach")
@@ -143,8 +123,17 @@ _PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", *_P
 _TEAM = ("gap", "face_bearing", "side", "others_away")
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
-    "paper": _space_of_paper("paper"),
-    "paper-box": _space_of_paper("paper-box"),
+    "paper": _space_of_paper(),
+    # The same with the box as the goal of an agent. Others move the box, so only the speed is own.
+    "paper-box": build_space(
+        "paper-box",
+        "heading",
+        "box_bearing",
+        "robot_box_distance",
+        "box_orientation",
+        "box_goal_bearing",
+        "box_distance",
+    ),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
     "relational": build_space("relational", *_PUSHING),
     "pose": build_space("pose", *_PUSHING, "bend", "box_turn"),
