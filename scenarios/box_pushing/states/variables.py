@@ -154,7 +154,7 @@ def heading(situation: Situation, robot: Robot) -> float:
     return wrap_one(robot.heading)
 
 
-@_variable("m", 0.0, 0.5, mirrored="same")
+@_variable("m", 0.0, 0.5, centers=(0.05, 0.1, 0.15, 0.25, 0.5), mirrored="same")
 def robot_box_distance(situation: Situation, robot: Robot) -> float:
     """Distance of the robot from the center of the box."""
     dx, dy = situation.box[0] - robot.x, situation.box[1] - robot.y
