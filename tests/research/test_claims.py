@@ -343,6 +343,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors-teams-three",
         "predictors-eight",
         "poses",
+        "poses-controls",
         "poses-4",
         "poses-8",
         "pendulum",
