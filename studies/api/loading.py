@@ -11,7 +11,7 @@ from ...core.numerics import pd
 from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest, expect, expect_each
 from ..errors import SpecError, refused
-from ..results import exported, foreign, marl_eval, published
+from ..results import exported, foreign, headers, marl_eval, published
 from ..results.foreign import Better, ScoreColumns
 from ..results.joining import combine, join_parts
 from ..results.json_values import JsonValue, parse
@@ -183,9 +183,13 @@ def _open(path: Path) -> Opened:
 
 def _of_published(path: Path, file: JsonValue) -> StudyResults:
     kept = published.read_file(file)
-    remarks = (f"{path}: {kept.note}",) if kept.note else ()
-    sources = Sources(path.parent, brought_by=str(path))
-    return StudyResults(kept.outline, kept.results, (), remarks, sources)
+    remarks = tuple(f"{path}: {note}" for note in kept.notes)
+    return StudyResults(kept.outline, kept.results, (), remarks, _sources_beside(path))
+
+
+def _sources_beside(path: Path | None) -> Sources:
+    """Return the files that somebody else's file of results may name: those of its folder."""
+    return Sources(path and path.parent, brought_by=str(path or "a table"))
 
 
 def _results_of(
@@ -212,21 +216,26 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
     """Return the results of a table of scores, or of an exported one; messages name its file."""
     before = f"{path}: " if path else ""
     measure = None
+    header = headers.header_beside(path) if path else None
+    is_listed = header is not None and header.is_listed
+    is_exported = exported.is_exported(table, is_listed=is_listed) and roles.keys() <= {"score"}
+    if not (is_exported or is_listed):
+        header = None
     with refused(before):
-        if exported.is_exported(table) and roles.keys() <= {"score"}:
+        if is_exported:
             _check_better(better)
-            header = published.header_beside(path) if path else None
             own = exported.results_of(table, header and header.description)
             outline = header.outline if header else _outline(own.conditions)
-            results, notes = own.results, own.notes
-            if header and path:
-                results, notes = header.limited(results), (*header.remarks(path), *notes)
+            results = header.limited(own.results) if header else own.results
+            notes = own.notes
             measure = next(iter(map(str, roles.values())), None)
         else:
             columns = ScoreColumns.of(roles, table.columns)
             outline, results, notes = foreign.results_of(table, columns, better)
-    remarks = tuple(f"{before}{line}" for line in notes)
-    return StudyResults(outline, results, (), remarks, _defaults=Defaults(measure))
+    remarks = tuple(f"{before}{line}" for line in (*(header.notes if header else ()), *notes))
+    return StudyResults(
+        outline, results, (), remarks, _sources_beside(path), _defaults=Defaults(measure)
+    )
 
 
 def _check_better(better: Better) -> None:
@@ -246,7 +255,7 @@ def _outline(conditions: Mapping[str, Mapping[str, object]]) -> StudyOutline:
 
 def _of_runs(path: Path, runs: Sequence[marl_eval.AlgorithmRun], better: Better) -> StudyResults:
     """Return the results of runs of the form of marl-eval."""
-    header = published.header_beside(path)
+    header = headers.header_beside(path)
     known = header.columns if header else {}
     names = {marl_eval.exported_name(condition) for condition in known}
     is_exported = header is not None and {run.algorithm for run in runs} <= names
@@ -255,12 +264,14 @@ def _of_runs(path: Path, runs: Sequence[marl_eval.AlgorithmRun], better: Better)
             _check_better(better)
             own = marl_eval.results_of(runs, better, known, header.measures)
             outline, results = header.outline, header.limited(own.results)
-            notes = (*header.remarks(path), *own.notes)
         else:
             own = marl_eval.results_of(runs, better)
-            outline, results, notes = _outline(own.results.columns), own.results, own.notes
-    remarks = tuple(f"{path}: {line}" for line in notes)
-    return StudyResults(outline, results, (), remarks, _defaults=Defaults(by=own.by))
+            outline, results = _outline(own.results.columns), own.results
+    known_notes = header.notes if header and (is_exported or header.is_listed) else ()
+    remarks = tuple(f"{path}: {line}" for line in (*known_notes, *own.notes))
+    return StudyResults(
+        outline, results, (), remarks, _sources_beside(path), _defaults=Defaults(by=own.by)
+    )
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:

@@ -41,10 +41,14 @@ class Exported(NamedTuple):
     notes: tuple[str, ...]
 
 
-def is_exported(table: ScoreTable) -> bool:
-    """Tell whether a table is one that a study exports."""
+def is_exported(table: ScoreTable, *, is_listed: bool = False) -> bool:
+    """Return whether a table has the columns of an exported study.
+
+    Tables of scores may have them, too, unless the file that describes a study lists the table.
+    """
     names = {*table.columns}
-    return "score" not in names and ({*EPISODES} <= names or {*TRIALS} <= names)
+    is_other = "score" in names and not is_listed
+    return not is_other and ({*EPISODES} <= names or {*TRIALS} <= names)
 
 
 def results_of(table: ScoreTable, known: Description | None) -> Exported:

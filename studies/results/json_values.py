@@ -5,9 +5,10 @@ Every access checks the type; `ValueError` names the key, the value and what is 
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain
 from typing import Any, NamedTuple, NoReturn
 
@@ -18,6 +19,8 @@ from ...core.plugins.words import show
 
 MOST_WHOLE = 2**53
 """Up to here a float holds every whole number."""
+CHECKSUM = "sha256"
+"""Key of a file's own checksum."""
 LARGEST = {"i": MOST_WHOLE, "u": MOST_WHOLE, "f": np.finfo(float).max}
 """The largest value of an array, by the kind of its numbers."""
 
@@ -125,6 +128,15 @@ class JsonValue(NamedTuple):
         for value in values:
             value.number()
         raise self.refusal("finite numbers")
+
+
+def checksum(table: Mapping[str, object]) -> str:
+    """Return the SHA-256 of the content of a JSON file, without its own checksum.
+
+    White space and the notation of numbers do not change it.
+    """
+    content = {name: value for name, value in table.items() if name != CHECKSUM}
+    return hashlib.sha256(json.dumps(content, separators=(",", ":")).encode()).hexdigest()
 
 
 def parse(text: str) -> JsonValue:

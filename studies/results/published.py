@@ -7,30 +7,22 @@ committed files give the table that the run gave.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import fields, replace
 from pathlib import Path
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core.interface.measures import RETURN, Measure
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
-from ..store.database import RESULTS_VERSION, tables
 from ..store.database import SECONDS as PARTS
 from ..store.durable import read_text
-from .exported import Description
+from .headers import MOST_EPISODES, Header, header, in_lines, seeds_of
 from .json_values import JsonValue, parse
-from .results import SECONDS, Array, Results, StepLimits, from_arrays, pad_rows
+from .results import SECONDS, Array, Results, from_arrays, pad_rows
 
-GATHERINGS = get_args(Measure.__annotations__["gathering"])
-"""Ways in which the steps of an episode make one number."""
-HEADER = "study.json"
-"""Name of the file that describes the study of exported tables."""
 FEW = 100
 """Fewer rows, or values, are always written one by one."""
 
@@ -56,86 +48,7 @@ def dumps(outline: StudyOutline, results: Results) -> str:
         "numbers": _pack_numbers(results, lambda name: name not in results.usage),
         "usage": _pack_numbers(results, lambda name: name in results.usage),
     }
-    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def header(outline: StudyOutline, results: Results) -> dict[str, object]:
-    """Return the description of a study: version, spec, swept keys, measures."""
-    return {
-        "results_version": RESULTS_VERSION,
-        "spec": outline.table,
-        "columns": {c: results.columns.get(c, {}) for c in results.conditions},
-        "measures": tables(m for m in results.measures if m.name in results.episodes),
-    }
-
-
-class Header(NamedTuple):
-    """Content of `header`."""
-
-    outline: StudyOutline
-    columns: dict[str, dict[str, str | float | bool | None]]
-    measures: tuple[Measure, ...]
-    version: int
-    digests: Mapping[str, str]
-    """SHA-256 by name of the tables that were exported with it, as CSV."""
-
-    @property
-    def note(self) -> str | None:
-        """Note on results of another version than this; None for those of this version."""
-        if self.version == RESULTS_VERSION:
-            return None
-        return f"results of version {self.version}, this is version {RESULTS_VERSION}"
-
-    def remarks(self, path: Path) -> tuple[str, ...]:
-        """Return the note, and that an exported table has been changed."""
-        known = self.digests.get(path.name)
-        is_changed = known not in (None, hashlib.sha256(path.read_bytes()).hexdigest())
-        changed = f"has been changed since it was exported, says {HEADER}"
-        return (*filter(None, [self.note]), *[changed] * is_changed)
-
-    def limited(self, results: Results) -> Results:
-        """Return results with the limits of the spec."""
-        return replace(results, step_limits=StepLimits.of(self.outline.table))
-
-    @property
-    def description(self) -> Description:
-        """Description for reading exported tables."""
-        return Description(self.columns, self.measures)
-
-    @classmethod
-    def of(cls, file: JsonValue) -> Header:
-        """Return the header of a file.
-
-        Raises
-        ------
-        ValueError
-            If the file has none.
-        """
-        version = file.child("results_version").whole(1, MOST_VERSION)
-        columns = _columns(file.child("columns"))
-        outline = _outline(file.child("spec"), columns)
-        kept = file.table().get("sha256")
-        digests = {name: own.text() for name, own in kept.table().items()} if kept else {}
-        return cls(outline, columns, _measures(file.child("measures")), version, digests)
-
-
-def header_beside(path: Path) -> Header | None:
-    """Return the header in the folder of an exported table; None if there is none.
-
-    Raises
-    ------
-    SpecError
-        If it is damaged.
-    """
-    place = path.with_name(HEADER)
-    if not place.is_file():
-        return None
-    try:
-        file = parse(read_text(place))
-        return Header.of(file) if "results_version" in file.table() else None
-    except (OSError, ValueError, RecursionError) as error:
-        raise SpecError(f"{place}: describes no exported study: {error}") from None
+    return in_lines(content)
 
 
 class Published(NamedTuple):
@@ -144,7 +57,7 @@ class Published(NamedTuple):
     outline: StudyOutline
     results: Results
     version: int
-    note: str | None
+    notes: tuple[str, ...]
 
 
 def loads(text: str) -> Published:
@@ -162,7 +75,7 @@ def read_file(file: JsonValue) -> Published:
     """Return the results of a file as `loads` does."""
     own = Header.of(file)
     measures = own.measures
-    seeds = {name: _seeds(listed) for name, listed in file.child("seeds").table().items()}
+    seeds = {name: seeds_of(listed) for name, listed in file.child("seeds").table().items()}
     for condition in seeds:
         file.child("columns").child(condition)
     room = Room()
@@ -173,7 +86,7 @@ def read_file(file: JsonValue) -> Published:
     numbers = _numbers(file.child("numbers"), seeds, (), room)
     usage = _numbers(file.child("usage"), seeds, PARTS, room)
     results = own.limited(from_arrays(phases, seeds, numbers, usage, own.columns, measures))
-    return Published(own.outline, results, own.version, own.note)
+    return Published(own.outline, results, own.version, own.notes)
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
@@ -242,12 +155,6 @@ def _pack_numbers(results: Results, wanted: Callable[[str], bool]) -> dict[str, 
     }
 
 
-MOST_SEEDS = 100_000
-"""Largest number of seeds of a condition."""
-MOST_EPISODES = 1_000_000
-"""Largest number of episodes of a trial."""
-MOST_VERSION = 1_000_000
-"""Larger than any version of results will be."""
 MOST_VALUES = 20_000_000
 """Values of a file that are written as one for all: some characters could fill any memory."""
 
@@ -268,75 +175,6 @@ class Room:
         if self._left < 0:
             raise shape.refusal(f"small: at most {MOST_VALUES} values of a file are one for all")
         return lengths
-
-
-def _outline(spec: JsonValue, columns: Mapping[str, Mapping[str, object]]) -> StudyOutline:
-    """Return the outline of a spec, which is read where a page or a table names it."""
-    spec.child("study").text()
-    _seeds(spec.child("seeds"))
-    for name in ("episodes", "steps", "evaluation"):
-        spec.child(name).whole(0, MOST_EPISODES)
-    own = spec.table()
-    if "evaluation_steps" in own:
-        own["evaluation_steps"].whole(1, MOST_EPISODES)
-    overrides = own["overrides"].items() if "overrides" in own else []
-    for part in (spec, *overrides):
-        if "curriculum" in part.table():
-            for stage in part.child("curriculum").items():
-                stage.child("episodes").whole(0, MOST_EPISODES)
-    return StudyOutline.noted(spec.content, columns)
-
-
-def _seeds(value: JsonValue) -> tuple[int, ...]:
-    if not isinstance(value.content, list):
-        return tuple(range(value.whole(1, MOST_SEEDS)))
-    seeds = tuple(seed.whole(0, 2**63 - 1) for seed in value.items())
-    if not 1 <= len(seeds) <= MOST_SEEDS:
-        raise value.refusal(f"a list of 1 to {MOST_SEEDS} seeds")
-    if len(set(seeds)) < len(seeds):
-        raise value.refusal("a list of distinct seeds")
-    return seeds
-
-
-def _columns(value: JsonValue) -> dict[str, dict[str, str | float | bool | None]]:
-    """Return what tells the conditions apart, texts and numbers."""
-    columns = {name: row.table() for name, row in value.table().items()}
-    for row in columns.values():
-        for own in row.values():
-            if isinstance(own.content, int | float) and not isinstance(own.content, bool):
-                own.number()
-            elif own.content is not None and not isinstance(own.content, str | bool):
-                raise own.refusal("text, a number, true or false")
-    return {name: {key: own.content for key, own in row.items()} for name, row in columns.items()}
-
-
-def _measures(value: JsonValue) -> tuple[Measure, ...]:
-    measures = tuple(_measure(table) for table in value.items())
-    names = [measure.name for measure in measures]
-    if len({*names, "steps", "return"}) < len(names) + 2:
-        raise value.refusal("of distinct names, none of them steps or return")
-    return measures
-
-
-def _measure(value: JsonValue) -> Measure:
-    table = value.table()
-    known = {field.name for field in fields(Measure)}
-    for name, own in table.items():
-        if name not in known:
-            raise ValueError(f"{own.key}: known: {', '.join(sorted(known))}")
-    for name in ("name", "title", "unit", "source"):
-        if name in table or name in ("name", "title"):
-            value.child(name).text()
-    for name in ("least", "greatest"):
-        if name in table and table[name].content is not None:
-            table[name].number()
-    if "gathering" in table:
-        table["gathering"].text(GATHERINGS)
-    if "better" in table and table["better"].content is not None:
-        table["better"].text(("higher", "lower"))
-    if "is_rate" in table:
-        table["is_rate"].flag()
-    return Measure(**value.content)
 
 
 def _arrays(
