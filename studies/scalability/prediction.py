@@ -21,7 +21,7 @@ from ..laws.size_axis import SizeAxis, check_size, columns_of
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary, estimate_over_seeds
 from ..results.comparison import values_of
-from ..results.json_values import CHECKSUM, checksum
+from ..results.json_files import CHECKSUM, checksum
 from ..results.notation import format_estimate, format_number
 from ..results.results import Results
 from ..results.statistics import Estimate
