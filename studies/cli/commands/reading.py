@@ -265,7 +265,7 @@ def _contents(store: Store, form: Files, folder: Path) -> dict[str, bytes]:
         files = {f"{name}.csv": in_csv(frame).encode() for name, frame in frames.items()}
     else:
         files = {f"{name}.parquet": in_parquet(frame) for name, frame in frames.items()}
-    return files | {headers.HEADER: headers.describe(outline, results, files, folder)}
+    return files | {published.HEADER: headers.describe(outline, results, files, folder)}
 
 
 @click.command()
