@@ -302,6 +302,8 @@ class SummaryTable:
 def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:
     """Return the table of summaries, which may have different estimates.
 
+    It has copies of the estimates: changing them changes no result.
+
     Parameters
     ----------
     lines
@@ -325,7 +327,8 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
             has = f"it has {', '.join(map(repr, titles)) or 'none'}"
             hint = f"{near(column, titles)} {has}".lstrip()
             raise SpecError(f"columns: the table has no {column!r}; {hint}")
-    return SummaryTable(tuple(columns) or titles, tuple(lines))
+    own = tuple(line._replace(estimates=dict(line.estimates)) for line in lines)
+    return SummaryTable(tuple(columns) or titles, own)
 
 
 def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> str:
