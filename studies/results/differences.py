@@ -220,11 +220,15 @@ def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Esti
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '1.00 [0.54, 1.00]'
     """
-    a = rate(first, level)
-    b = rate(second, level)
-    value = a.value - b.value
-    low = value - np.hypot(a.value - a.low, b.high - b.value)
-    return Estimate(value, low, value + np.hypot(a.high - a.value, b.value - b.low))
+    return difference_of_estimates(rate(first, level), rate(second, level))
+
+
+def difference_of_estimates(first: Estimate, second: Estimate) -> Estimate:
+    """Return the first estimate minus the second, with intervals combined as independent ones."""
+    value = first.value - second.value
+    low = value - np.hypot(first.value - first.low, second.high - second.value)
+    high = value + np.hypot(first.high - first.value, second.value - second.low)
+    return Estimate(value, low, high)
 
 
 def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> Estimate:

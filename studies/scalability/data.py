@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..laws.scaling import decisions_to_criterion
 from ..laws.size_axis import SizeAxis, columns_of
 from ..laws.universal import Scaling, Times
-from ..results.analysis import estimate_of, estimate_over_seeds
+from ..results.analysis import estimate_of, mean_estimate
 from ..results.comparison import title_of, values_of
 from ..results.results import Results
 from ..results.statistics import Array, Estimate
@@ -163,7 +163,7 @@ def collect(
         performance_estimates={
             places[condition]: estimate_of(results, condition, phase, shown_as)
             if phase
-            else estimate_over_seeds(pd.Series(own).to_numpy(float), shown_as)
+            else mean_estimate(shown_as, pd.DataFrame(own))
             for condition, own in values.items()
         },
         times=_times(results, phase or None, places),

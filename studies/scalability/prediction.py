@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from ...core.numerics import pd
 from ..errors import SpecError
 from ..laws.scaling import scaling_law
 from ..laws.size_axis import SizeAxis, check_size, columns_of
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import Summary, estimate_over_seeds
+from ..results.analysis import Summary, mean_estimate
 from ..results.comparison import values_of
 from ..results.notation import format_estimate, format_number
 from ..results.results import Results
@@ -242,9 +243,8 @@ def check(file: PredictionFile, results: Results, spec: SpecTable) -> Prediction
         measure, values, _ = measured[prediction.measure]
         condition = condition_at.get((prediction.hierarchy, prediction.size))
         if condition in values:
-            numbers = values[condition].to_numpy(dtype=float)
-            estimate = estimate_over_seeds(numbers, measure)
-            checked.append(CheckedPrediction(prediction, len(numbers), estimate))
+            own = pd.DataFrame(values[condition])
+            checked.append(CheckedPrediction(prediction, len(own), mean_estimate(measure, own)))
     if not checked:
         predicted = ", ".join(f"{n:g}" for n in sorted({p.size for p in file.predictions}))
         raise SpecError(

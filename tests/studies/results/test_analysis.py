@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -8,7 +9,7 @@ from made_up_results import ablation
 from scipy import stats
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.studies.results.analysis import estimate_of, estimate_over_seeds, verdicts
+from nested_agents.studies.results.analysis import estimate_of, mean_estimate, verdicts
 from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.differences import (
     Difference,
@@ -51,7 +52,7 @@ def test_no_interval_leaves_the_range_of_its_measure(data, measure, n_seeds) -> 
         np.array
     )
     own, base = data.draw(values), data.draw(values)
-    assert within(estimate_over_seeds(own, measure), measure.bounds)
+    assert within(mean_estimate(measure, pd.DataFrame(own)), measure.bounds)
     reach = greatest - least
     assert within(paired_difference(own, base, measure), (-reach, reach))
 
@@ -60,7 +61,7 @@ def test_no_interval_leaves_the_range_of_its_measure(data, measure, n_seeds) -> 
 def test_no_interval_of_rates_leaves_their_range(own, data) -> None:
     base = data.draw(st.lists(st.booleans(), min_size=len(own), max_size=len(own)))
     one, other = np.array(own, float), np.array(base, float)
-    assert within(estimate_over_seeds(one, SUCCESS), (0.0, 1.0))
+    assert within(mean_estimate(SUCCESS, pd.DataFrame(one)), (0.0, 1.0))
     assert within(paired_difference(one, other, SUCCESS), (-1.0, 1.0))
 
 
