@@ -40,42 +40,27 @@ def text_of(frame: pd.DataFrame, width: int = WIDTH, *, index: bool = True) -> s
 
     Headings that are wider than their column have two lines. No column stands alone below others.
     """
-    labels = ["", "", *(printable(str(label)) for label in frame.index)] if index else []
-    columns = []
-    for title, cells in frame.items():
-        heading = _in_two_lines(printable(str(title)), max(map(len, cells), default=0))
-        columns.append(_justified([*heading, *cells]))
-    left = [_justified(labels, "<")] if index else []
-    room = width - len(left[0][0] if left else "")
-    tables = ["\n".join(_joined([*left, *block])) for block in _blocks(columns, room)]
-    return "\n\n".join(tables)
+    text = _in_lines(frame, width, index=index)
+    without_last = _in_lines(frame.iloc[:, :-1], width, index=index)
+    if len(frame.columns) < 3 or text.count("\n\n") == without_last.count("\n\n"):
+        return text
+    parts = frame.iloc[:, :-2], frame.iloc[:, -2:]
+    return "\n\n".join(text_of(part, width, index=index) for part in parts)
 
 
-def _justified(cells: Sequence[str], side: str = ">") -> list[str]:
-    longest = max(map(len, cells))
-    return [f"{cell:{side}{longest}}" for cell in cells]
-
-
-def _joined(columns: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of columns next to each other, without an empty first line of headings."""
-    first, *lines = ("  ".join(cells).rstrip() for cells in zip(*columns, strict=True))
-    return [first, *lines] if first else lines
-
-
-def _blocks(columns: Sequence[list[str]], room: int) -> list[list[list[str]]]:
-    """Return columns in groups that fit into a number of characters; none is alone in the last."""
-    blocks: list[list[list[str]]] = [[]]
-    left = room
-    for column in columns:
-        taken = len(column[0]) + 2
-        if blocks[-1] and taken > left:
-            blocks.append([])
-            left = room
-        blocks[-1].append(column)
-        left -= taken
-    if len(blocks) > 1 and len(blocks[-1]) == 1 and len(blocks[-2]) > 2:
-        blocks[-1].insert(0, blocks[-2].pop())
-    return blocks
+def _in_lines(frame: pd.DataFrame, width: int, *, index: bool) -> str:
+    """Return a table of texts in lines of a width."""
+    clean = frame.rename(index=lambda label: printable(str(label)))
+    headings = [
+        _in_two_lines(printable(title), max(map(len, frame[title]), default=0)) for title in frame
+    ]
+    if any(above for above, _ in headings):
+        clean.columns = pd.MultiIndex.from_tuples(headings)
+    else:
+        clean.columns = [title for _, title in headings]
+    text = clean.to_string(index=index, line_width=width, sparsify=False).replace("  \\\n", "\n")
+    lines = "\n".join(map(str.rstrip, text.splitlines()))
+    return lines.replace("\n\n\n", "\n\n").lstrip("\n")  # without empty first lines of headings
 
 
 def _in_two_lines(title: str, width: int) -> tuple[str, str]:
@@ -392,5 +377,7 @@ def _in_one_line(text: str) -> str:
 
 def _aligned(cells: Sequence[str]) -> list[str]:
     """Return cells in which values end, and intervals begin, at one place."""
-    values, _, intervals = zip(*(cell.partition(" ") for cell in cells), strict=True)
-    return [f"{v} {i}" for v, i in zip(_justified(values), _justified(intervals, "<"), strict=True)]
+    parts = [cell.partition(" ") for cell in cells]
+    value = max(len(value) for value, *_ in parts)
+    interval = max(len(interval) for *_, interval in parts)
+    return [f"{v:>{value}} {i:<{interval}}" for v, _, i in parts]

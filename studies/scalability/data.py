@@ -94,6 +94,20 @@ class ScalabilityData:
         """Return the hierarchies that were measured at a size."""
         return tuple(name for name in self.hierarchies if (name, size) in self.performances)
 
+    def paired_at(
+        self, size: float, measured: Sequence[Cells]
+    ) -> tuple[tuple[str, ...], list[Array]]:
+        """Return the hierarchies at a size with all of some values, and their values.
+
+        Performance and the other values ``(n_seeds, n_hierarchies)`` are those of the seeds that
+        all share.
+        """
+        groups = [self.performances, *measured]
+        here = self.at_size(size)
+        names = tuple(name for name in here if all((name, size) in cells for cells in measured))
+        columns = [cells[name, size] for cells in groups for name in names]
+        return names, np.split(paired(columns), len(groups), axis=1)
+
     def times_of(self, hierarchy: str) -> Times | None:
         """Return the times of the seeds that ran at all sizes; None if fewer than two did."""
         sizes = self.sizes(hierarchy)

@@ -126,5 +126,5 @@ def _check(loaded: StudyResults, file: Path, form: Form) -> int:
         print_data(in_form(checked.table, form))
     else:
         print_table(checked.table, ())
-        print_lines(checked.sentences)
+        print_lines(checked.notes)
     return 0

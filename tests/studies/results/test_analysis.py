@@ -196,7 +196,8 @@ def test_an_interval_that_seems_to_contradict_p_is_explained_once(
 ) -> None:
     estimate = Estimate(*map(np.array, (0.2, low, 0.4)))
     sample = np.linspace(0.0, 0.4, 8)
-    found = Difference("a", "evaluation success", 8, estimate, p, p, sample)
+    values = (sample, np.zeros(8))
+    found = Difference("a", "evaluation success", estimate, p, p, values)
     text = " ".join(" ".join(verdicts({"all": [found, found]})).split())
     assert text.count("seem to disagree about 0, p decides.") == is_explained
     assert "with power 0.80 among 2 comparisons in evaluation success." in text
