@@ -22,7 +22,7 @@ from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
 from ..errors import WIDTH, SpecError
 from ..results.analysis import Summary
-from ..results.notation import format_estimate
+from ..results.notation import format_estimate, wrapped
 from ..results.spreadsheet import harmless
 from ..results.statistics import FEW, exactly, plain, stack_estimates
 from .legend import meanings
@@ -227,7 +227,10 @@ class SummaryTable:
         if self.seeds == 1:
             return ["Values of 1 seed, without intervals."]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
-        lines = [f"Means over {over} with 95% intervals.", self.remark or self._usual_remark]
+        lines = [
+            f"Means over {over} with 95% intervals.",
+            *wrapped(self.remark or self._usual_remark),
+        ]
         has_interval = self.cells.map(lambda text: " " in text).where(self.cells != "")
         if (has_interval.nunique() > 1).any():
             lines.append("Without an interval: one seed has the value, or all seeds have the same.")
