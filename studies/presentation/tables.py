@@ -306,6 +306,8 @@ def tabulate(
 ) -> SummaryTable:
     """Return the table of summaries, which may have different estimates.
 
+    It has copies of the estimates: changing them changes no result.
+
     Parameters
     ----------
     lines
@@ -331,7 +333,8 @@ def tabulate(
             has = f"it has {', '.join(map(repr, titles)) or 'none'}"
             hint = f"{near(column, titles)} {has}".lstrip()
             raise SpecError(f"columns: the table has no {column!r}; {hint}")
-    return SummaryTable(tuple(columns) or titles, tuple(lines), remark)
+    own = tuple(line._replace(estimates=dict(line.estimates)) for line in lines)
+    return SummaryTable(tuple(columns) or titles, own, remark)
 
 
 def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> str:

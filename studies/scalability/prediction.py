@@ -6,7 +6,6 @@ the spec of the study and a hash, so that a later change of the file is found.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary, mean_estimate
 from ..results.comparison import values_of
+from ..results.json_files import CHECKSUM, checksum
 from ..results.notation import format_estimate, format_number
 from ..results.results import Results
 from ..results.statistics import Estimate
@@ -65,14 +65,15 @@ class PredictionFile(NamedTuple):
     @property
     def digest(self) -> str:
         """Hash of everything but the hash."""
-        content = json.dumps(self._replace(sha256=""), sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(content.encode()).hexdigest()
+        return checksum(self._to_dict())
 
     def write(self, path: Path) -> None:
         """Write the file with its hash."""
-        table = self._replace(sha256=self.digest)._asdict()
-        table["predictions"] = [p._asdict() for p in self.predictions]
+        table = {**self._to_dict(), CHECKSUM: self.digest}
         durable.write(path, json.dumps(table, indent=1).encode())
+
+    def _to_dict(self) -> dict[str, object]:
+        return {**self._asdict(), "predictions": [p._asdict() for p in self.predictions]}
 
     @classmethod
     def read(cls, path: Path) -> PredictionFile:
