@@ -154,7 +154,7 @@ def compare(
             print_data(f"\n{in_form(comparison.aggregated, form)}")
         return 0
     print_table(comparison.table)
-    print_text("", *comparison.verdicts)
+    print_text("", *comparison.notes)
     if statistics:
         print_text("")
         print_table(comparison.aggregated, comparison.statistics.notes)
