@@ -354,10 +354,17 @@ class BoxPushing(Scenario):
 
         `speeds` are those commanded ``(m, n)`` [m/s].
         """
-        own = self.space.own_of_all(batch, speeds.T)
-        shared = self.space.shared(batch, range(len(self.groups)))[self.body]
-        states = np.concatenate([own, shared], axis=2)
-        return np.ascontiguousarray(states.swapaxes(0, 1))
+        shared = self.space.shared(batch, range(len(self.groups))).swapaxes(0, 1)
+        m, n_robots, _ = shared.shape
+        n_own = self.state_space.n_own
+        poses = batch.robots.transpose(2, 0, 1)
+        if self.space.own_needs_pose:
+            poses = poses[:, self.body]
+        states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
+        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), self.aim)
+        states[..., :n_own] = own.reshape(*states.shape[:3], -1)
+        states[..., n_own:] = shared[:, :, None]
+        return states.reshape(*speeds.shape, -1)
 
 
 class BoxEnvironments(StackedEnvironments[BoxPushing]):

@@ -219,20 +219,17 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         r, wheel = divmod(agent, len(self.groups[0]))
         space = self.settings.space
         speeds = self.wheel_commands.speeds[r, :, wheel]
-        poses: FloatArray = np.zeros((len(speeds), 3))
-        boxes = poses
-        if space.own_needs_pose:
-            poses, boxes = self._poses_alone(r)
+        poses = self._poses_alone(r) if space.own_needs_pose else np.zeros((len(speeds), 3))
         return Blocks(
-            space.own(poses, speeds, boxes, self.situation.goal),
+            space.own(poses, speeds, self.situation.goal),
             self._shared[r],
             divisor=len(self.settings.action_set) ** sum(map(len, self.groups[r + 1 :])),
             shared_rows=self._table[1],
             alone=space.own_needs_pose,
         )
 
-    def _poses_alone(self, r: int) -> tuple[FloatArray, FloatArray]:
-        """Return poses ``(K, 3)`` of a robot and the box after its actions, if it pushed alone."""
+    def _poses_alone(self, r: int) -> FloatArray:
+        """Return the poses ``(K, 3)`` of a robot after each of its actions, if it pushed alone."""
         only = slice(r, r + 1)
         model = self.model._replace(
             radii=self.model.radii[only], compliance=self.model.compliance[only]
@@ -240,10 +237,10 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         now = self.situation
         twists = self.wheel_commands.twists[only]
         actions = np.arange(twists.shape[1])[None]
-        robots, boxes, _ = push(
+        robots, _, _ = push(
             now.robots[only], now.box, twists, actions, self.settings.horizon, model
         )
-        return robots[0].T, boxes.T
+        return robots[0].T
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
@@ -251,7 +248,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         r, wheel = divmod(agent, len(self.groups[0]))
         space = self.settings.space
         speeds = self.wheel_commands.speeds[r, actions[r], wheel]
-        own = space.own(batch.robots[r].T, speeds, batch.boxes.T, self.situation.goal)
+        own = space.own(batch.robots[r].T, speeds, self.situation.goal)
         return np.concatenate([own, space.shared(batch, [r])[0]], axis=1)
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -262,7 +259,12 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         actions, batch = self._at_horizon(joint_actions)
         space = self.settings.space
         speeds = speeds_of(actions, self.wheel_commands.speeds)
-        return space.own_of_all(batch, speeds), space.shared(batch, range(len(actions)))
+        poses: FloatArray = np.zeros((0, 3))
+        if space.own_needs_pose:
+            of_robots = batch.robots.transpose(0, 2, 1)
+            poses = np.repeat(of_robots, len(speeds) // len(of_robots), axis=0).reshape(-1, 3)
+        own = space.own(poses, speeds.reshape(-1), self.situation.goal)
+        return own.reshape(*speeds.shape, -1), space.shared(batch, range(len(actions)))
 
     def poses(self, joint_actions: IntArray) -> SituationBatch:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""

@@ -5,11 +5,10 @@ variables are those of `variables`. A spec chooses a state space of `STATE_SPACE
 shared variables, built in or of its own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
-from typing import Literal
 
 import numpy as np
 
@@ -26,8 +25,10 @@ class BoxStateSpace:
 
     space: StateSpace
     """Names, ranges and membership centers."""
-    target: Literal["box", "goal"] | None
-    """Target of the own variables of Eq. 1; None if the wheel speed is the only own variable."""
+    own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    """``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``."""
+    own_needs_pose: bool
+    """Whether `own` depends on the poses."""
     variables: tuple[StateVariable, ...]
     """The shared variables, in order."""
 
@@ -40,44 +41,6 @@ class BoxStateSpace:
     def is_built_in(self) -> bool:
         """Whether all shared variables are built in."""
         return all(variable.trusted for variable in self.variables)
-
-    @property
-    def own_needs_pose(self) -> bool:
-        """Whether own variables depend on the poses of robots and box."""
-        return self.target is not None
-
-    def own(
-        self, poses: FloatArray, speeds: FloatArray, boxes: FloatArray, goal: FloatArray
-    ) -> FloatArray:
-        """Return the own variables ``(m, n_own)`` of agents.
-
-        Parameters
-        ----------
-        poses, boxes
-            ``(m, 3)`` of the robot and the box; anything unless `own_needs_pose`.
-        speeds
-            ``(m,)`` wheel speeds [m/s].
-        goal
-            ``(3,)`` goal pose of the box.
-        """
-        if self.target is None:
-            return speeds[:, None]
-        target = boxes if self.target == "box" else goal
-        x, y = (target[..., :2] - poses[:, :2]).T
-        heading = poses[:, 2]
-        bearing = wrap(np.arctan2(y, x) - heading)
-        return np.stack([wrap(heading), bearing, np.hypot(x, y), speeds], axis=1)
-
-    def own_of_all(self, batch: SituationBatch, speeds: FloatArray) -> FloatArray:
-        """Return the own variables ``(n, m, n_own)`` of all agents, given speeds ``(n, m)``."""
-        n, _ = speeds.shape
-        poses = boxes = batch.boxes.T
-        if self.own_needs_pose:
-            robots = batch.robots.transpose(0, 2, 1)
-            poses = np.repeat(robots, n // len(robots), axis=0).reshape(-1, 3)
-            boxes = np.tile(boxes, (n, 1))
-        own = self.own(poses, speeds.reshape(-1), boxes, batch.goal)
-        return own.reshape(*speeds.shape, -1)
 
     def shared(self, batch: SituationBatch, robots: Sequence[int]) -> FloatArray:
         """Return the shared variables ``(k, m, d - n_own)`` of k robots in m situations.
@@ -96,6 +59,14 @@ class BoxStateSpace:
                         values = variable.function(situation, situation.robots[robot])
                         out[k, :, column] = variable.checked(values, batch.boxes.shape[1])
         return out
+
+
+def _own_of_paper(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
+    """Return theta_i, phi_i, d_i and omega_i of Eq. 1."""
+    x, y = (goal[:2] - poses[:, :2]).T
+    heading = poses[:, 2]
+    bearing = wrap(np.arctan2(y, x) - heading)
+    return np.stack([wrap(heading), bearing, np.hypot(x, y), speeds], axis=1)
 
 
 _EVEN = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))
@@ -120,18 +91,16 @@ def build_space(name: str, *shared: str) -> BoxStateSpace:
         If there is none, one is unknown or named twice.
     """
     variables = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
-    return BoxStateSpace(space_of(name, _SPEED, variables), None, variables)
-
-
-def _space_of_paper(name: str) -> BoxStateSpace:
-    """Return the state of Eq. 1, in the order of its own and its shared part.
-
-    The goal of an agent is the goal of the box or, in ``paper-box``, the box itself.
-    """
-    is_box = name == "paper-box"
-    bearing_name, distance_name = (
-        ("box_bearing", "robot_box_distance") if is_box else ("goal_bearing", "goal_distance")
+    return BoxStateSpace(
+        space_of(name, _SPEED, variables),
+        lambda poses, speeds, goal: speeds[:, None],
+        own_needs_pose=False,
+        variables=variables,
     )
+
+
+def _space_of_paper() -> BoxStateSpace:
+    """Return the state of Eq. 1, in the order of its own and its shared part."""
     orientation, bearing, distance = (
         find_variable(STATE_VARIABLES, name)
         for name in ("box_orientation", "box_goal_bearing", "box_distance")
@@ -140,13 +109,13 @@ def _space_of_paper(name: str) -> BoxStateSpace:
     shared = (orientation, bearing, replace(distance, variable=coarse))
     angles = (
         Variable(name, "rad", -pi, pi, True, centers, mirrored="opposite")
-        for name, centers in (("heading", _EVEN), (bearing_name, ()))
+        for name, centers in (("heading", _EVEN), ("goal_bearing", ()))
     )
-    goal_distance = Variable(distance_name, "m", 0.0, 1.5, mirrored="same")
+    goal_distance = Variable("goal_distance", "m", 0.0, 1.5, mirrored="same")
     described = (*angles, goal_distance, _SPEED, *(each.variable for each in shared))
     common = tuple(each.variable.name for each in shared)
-    space = StateSpace(name, described, n_own=4, common=common)
-    return BoxStateSpace(space, "box" if is_box else "goal", shared)
+    space = StateSpace("paper", described, n_own=4, common=common)
+    return BoxStateSpace(space, _own_of_paper, own_needs_pose=True, variables=shared)
 
 
 _PROGRESS = ("box_distance", "approach")
@@ -154,8 +123,17 @@ _PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", *_P
 _TEAM = ("gap", "face_bearing", "side", "others_away")
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
-    "paper": _space_of_paper("paper"),
-    "paper-box": _space_of_paper("paper-box"),
+    "paper": _space_of_paper(),
+    # The same with the box as the goal of an agent. Others move the box, so only the speed is own.
+    "paper-box": build_space(
+        "paper-box",
+        "heading",
+        "box_bearing",
+        "robot_box_distance",
+        "box_orientation",
+        "box_goal_bearing",
+        "box_distance",
+    ),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
     "relational": build_space("relational", *_PUSHING),
     "pose": build_space("pose", *_PUSHING, "bend", "box_turn"),

@@ -149,6 +149,19 @@ def gap(situation: Situation, robot: Robot) -> float:
     return robot.gap
 
 
+@_angle(_EVEN, ())
+def heading(situation: Situation, robot: Robot) -> float:
+    """Heading of the robot in the world frame (Eq. 1)."""
+    return wrap_one(robot.heading)
+
+
+@_variable("m", 0.0, 0.5, centers=(0.05, 0.1, 0.15, 0.25, 0.5), mirrored="same")
+def robot_box_distance(situation: Situation, robot: Robot) -> float:
+    """Distance of the robot from the center of the box."""
+    dx, dy = situation.box[0] - robot.x, situation.box[1] - robot.y
+    return np.sqrt(dx * dx + dy * dy)
+
+
 @_angle(_SIDES)
 def box_bearing(situation: Situation, robot: Robot) -> float:
     """Bearing of the box in the frame of the robot."""

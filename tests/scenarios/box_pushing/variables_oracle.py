@@ -76,6 +76,8 @@ def variables(batch: SituationBatch, robot: int) -> dict[str, FloatArray]:
         **bearings,
         **errors,
         "gap": gaps[:, robot],
+        "heading": wrap(heading),
+        "robot_box_distance": np.hypot(*(boxes[:, :2] - robots[:, robot, :2]).T),
         "box_bearing": wrap(azimuth - heading),
         "side": wrap(azimuth - course),
         "others_gap": gaps[:, others].max(axis=1),
