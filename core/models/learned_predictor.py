@@ -26,15 +26,13 @@ from ..numerics import BoolArray, FloatArray, IntArray
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
 from .adaptive import Adaptive, DynamicsModel
-from .learned_prediction import LearnedPrediction, TabulatedPrediction
+from .learned_prediction import LearnedPrediction
 from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states
 
 INTERVAL = 100
 """Number of decisions between regressions within an episode."""
 MAX_FEATURES = 4096
 """Maximum number of features of a regression that is solved densely."""
-MAX_TABULATED = 4**6
-"""Maximum number of joint actions of which predictions have tables."""
 OWN_RIDGE = 1e-6
 """Ridge of own variables, small since they are observed without noise."""
 MIDPOINT_ITERATIONS = 3
@@ -93,7 +91,13 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         self.limits = np.maximum(np.abs(low), np.abs(high))[: space.n_own]
         self.grains = GRAIN * (high - low)[: space.n_own]
         self._pending: list[tuple[FloatArray, IntArray, FloatArray]] = []
-        self._tabulate()
+        sizes = [len(group) for group in self.groups]
+        self.group_of = np.repeat(np.arange(len(self.groups)), sizes)
+        self.joint_actions: IntArray | None = None
+        """``(A ** w, w)`` joint actions of a group, if all groups have w agents."""
+        if len({*sizes}) == 1:
+            shape = (self.n_actions,) * sizes[0]
+            self.joint_actions = np.indices(shape).reshape(sizes[0], -1).T
         b, w = self.bodies.members.shape
         v = len(self.bodies.common)
         k = w * (space.n_own or self.n_actions + 1)
@@ -119,25 +123,9 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         }
         """Sums over all experience, and the weights computed from them."""
 
-    def _tabulate(self) -> None:
-        """Tabulate the joint actions of a group, and of all agents if there are few."""
-        a = self.n_actions
-        n = len(self.kinds)
-        sizes = {len(group) for group in self.groups}
-        self.group_of = np.repeat(np.arange(len(self.groups)), [len(g) for g in self.groups])
-        self.digits = self.joint = np.zeros((0, 0), dtype=np.int64)
-        """``(A ** w, w)`` if groups are of equal size; ``(A ** n, n)`` if agents are few, too."""
-        if len(sizes) == 1:
-            (w,) = sizes
-            self.digits = np.indices((a,) * w).reshape(w, -1).T
-            if a**n <= MAX_TABULATED:
-                self.joint = np.indices((a,) * n).reshape(n, -1).T
-                self.divisors = a ** np.arange(n - w, -1, -w)
-                self.local = np.arange(a**n)[:, None] // self.divisors % a**w
-
     def predict(self, states: FloatArray) -> LearnedPrediction:
         """Predict from states ``(n, d)``."""
-        return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
+        return LearnedPrediction(self, states)
 
     def adapt(
         self, prediction: LearnedPrediction, joint_action: IntArray, transition: Transition
