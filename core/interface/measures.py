@@ -3,13 +3,15 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 
 @dataclass(frozen=True)
 class Measure:
     """A number that describes an episode, a column of results."""
 
+    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
+    """Reading from a file: unknown keys and bounds that are no numbers are refused."""
     name: str
     """Name of the column. Scenarios are compared by ``success``."""
     title: str

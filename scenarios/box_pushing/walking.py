@@ -15,7 +15,7 @@ import numpy as np
 from shapely.geometry.polygon import orient
 
 from ...core.numerics import FloatArray, IntArray, njit, wrap, wrap_one
-from ..angles import angle_of, rotate
+from ..angles import rotate
 from .prediction.twists import displacement
 from .scenario import BoxPushing
 from .world.boxes import BoxSpec
@@ -53,6 +53,10 @@ class Path(NamedTuple):
     """``(P + 1, 2)`` corners [m]; the last is the first."""
     ways: FloatArray
     """``(P + 1,)`` distances from the first corner along the curve [m]."""
+    directions: FloatArray
+    """``(P, 2)`` unit vectors from each corner to the next."""
+    courses: FloatArray
+    """``(P,)`` angles of the directions [rad]."""
 
 
 class Wheels(NamedTuple):
@@ -97,8 +101,10 @@ def path_around(box: BoxSpec, margin: float) -> Path:
     assert box.polygon is not None
     around = orient(box.polygon.convex_hull.buffer(margin, quad_segs=4))
     points = np.ascontiguousarray(around.exterior.coords)
-    ways = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-    return Path(points, ways)
+    edges = np.diff(points, axis=0)
+    lengths = np.hypot(*edges.T)
+    ways = np.append(0.0, np.cumsum(lengths))
+    return Path(points, ways, edges / lengths[:, None], np.arctan2(edges[:, 1], edges[:, 0]))
 
 
 def poses_in_box(scenario: BoxPushing) -> FloatArray:
@@ -167,22 +173,21 @@ def locate(path: Path, x: float, y: float) -> Pose:
     Ways and distances are in m, the direction in rad. Distances towards the box are positive.
     """
     nearest = np.inf
-    way = course = side = 0.0
-    points = path.points
-    for i in range(len(points) - 1):
-        dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+    edge = 0
+    way = 0.0
+    for i in range(len(path.courses)):
+        ux, uy = path.directions[i, 0], path.directions[i, 1]
+        dx, dy = x - path.points[i, 0], y - path.points[i, 1]
         length = path.ways[i + 1] - path.ways[i]
-        along = ((x - points[i, 0]) * dx + (y - points[i, 1]) * dy) / length
-        along = min(max(along, 0.0), length)
-        off_x = x - points[i, 0] - along * dx / length
-        off_y = y - points[i, 1] - along * dy / length
-        square = off_x * off_x + off_y * off_y
+        along = min(max(ux * dx + uy * dy, 0.0), length)
+        square = (dx - along * ux) ** 2 + (dy - along * uy) ** 2
         if square < nearest:
             nearest = square
-            side = dx * off_y - dy * off_x
+            edge = i
             way = path.ways[i] + along
-            course = angle_of(dx, dy)
-    return way, np.copysign(np.sqrt(nearest), side), course
+    ux, uy = path.directions[edge, 0], path.directions[edge, 1]
+    side = ux * (y - path.points[edge, 1]) - uy * (x - path.points[edge, 0])
+    return way, np.copysign(np.sqrt(nearest), side), path.courses[edge]
 
 
 @njit(cache=True)
@@ -218,18 +223,47 @@ def _cost(path: Path, pose: Pose, place: Pose) -> float:
     return left + 2.0 * abs(off) + 20.0 * too_near + 0.06 * turn
 
 
+@njit(cache=True, forceinline=True)
+def _command(wheels: Wheels, speeds: FloatArray, action: int, wheel: int) -> float:
+    """Return the next speed of a wheel [m/s]."""
+    wanted = wheels.gains[action, wheel] * speeds[wheel] + wheels.increments[action, wheel]
+    return min(max(wanted, -wheels.limit), wheels.limit)
+
+
 @njit(cache=True)
 def _moved(wheels: Wheels, pose: Pose, speeds: FloatArray, action: int, out: FloatArray) -> Pose:
     """Return the pose after a decision period, and write the wheel speeds to `out`."""
     ahead, left, turn = wheels.effect[0, -1], wheels.effect[1, -1], wheels.effect[2, -1]
     for w in range(len(speeds)):
-        wanted = wheels.gains[action, w] * speeds[w] + wheels.increments[action, w]
-        out[w] = min(max(wanted, -wheels.limit), wheels.limit)
+        out[w] = _command(wheels, speeds, action, w)
         ahead += wheels.effect[0, w] * out[w]
         left += wheels.effect[1, w] * out[w]
         turn += wheels.effect[2, w] * out[w]
     dx, dy, turned = displacement(pose[2], (ahead, left, turn), wheels.period)
     return pose[0] + dx, pose[1] + dy, pose[2] + turned
+
+
+@njit(cache=True)
+def _same(wheels: Wheels, speeds: FloatArray, action: int, other: int) -> bool:
+    """Return whether two actions lead to the same wheel speeds."""
+    for w in range(len(speeds)):
+        if _command(wheels, speeds, action, w) != _command(wheels, speeds, other, w):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _distinct(wheels: Wheels, speeds: FloatArray, out: IntArray) -> IntArray:
+    """Return the actions, in `out`, except those that repeat the speeds of an earlier one."""
+    count = 0
+    for action in range(len(wheels.gains)):
+        is_new = True
+        for k in range(count):
+            is_new &= not _same(wheels, speeds, action, out[k])
+        if is_new:
+            out[count] = action
+            count += 1
+    return out[:count]
 
 
 @njit(cache=True)
@@ -269,13 +303,13 @@ def walk(
         The curve around the box, and the commands of a robot.
     """
     n_robots, n_wheels = speeds.shape
-    n_actions = len(wheels.gains)
     span = 2.0 * wheels.radius + CLEARANCE_M
     reach = span + 2.0 * (DEPTH + 1) * wheels.period * wheels.limit
     plans = np.empty((DEPTH, n_robots, 2))
     for level in range(DEPTH):
         plans[level] = poses[:, :2]
     now = np.empty((DEPTH + 1, n_wheels))
+    actions = np.empty((DEPTH, len(wheels.gains)), np.int64)
     chosen = np.zeros(n_robots, np.int64)
     trail = np.empty((DEPTH, 2))
     for r in order:
@@ -286,17 +320,17 @@ def walk(
         start = (poses[r, 0], poses[r, 1], poses[r, 2])
         now[0] = speeds[r]
         best = np.inf
-        for a in range(n_actions):
+        for a in _distinct(wheels, now[0], actions[0]):
             first = _moved(wheels, start, now[0], a, now[1])
             cost_a = 10.0 * _crowding(first[0], first[1], plans[0], near, span)
             cost_a += 0.1 * _cost(path, first, place)
-            for b in range(n_actions):
+            for b in _distinct(wheels, now[1], actions[1]):
                 second = _moved(wheels, first, now[1], b, now[2])
                 cost_b = cost_a + 10.0 * _crowding(second[0], second[1], plans[1], near, span)
                 cost_b += 0.1 * _cost(path, second, place)
                 if cost_b >= best:
                     continue
-                for c in range(n_actions):
+                for c in _distinct(wheels, now[2], actions[2]):
                     third = _moved(wheels, second, now[2], c, now[3])
                     cost = cost_b + 10.0 * _crowding(third[0], third[1], plans[2], near, span)
                     if cost >= best:

@@ -11,11 +11,15 @@ from ...core.numerics import pd
 from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest, expect, expect_each
 from ..errors import SpecError, refused
-from ..results import exported, foreign, marl_eval, published
-from ..results.foreign import Better, ScoreColumns
+from ..results import published
+from ..results.exported import is_exported, read_export
+from ..results.foreign_tables import ScoreColumns, parse_roles, read_scores
 from ..results.joining import combine, join_parts
-from ..results.json_values import JsonValue, parse
-from ..results.score_files import SUFFIXES, ScoreTable, read_table, table_of
+from ..results.json_files import read_json
+from ..results.marl_eval import Runs, is_exported_by, join_runs, read_runs, results_of_runs
+from ..results.published import Header
+from ..results.score_tables import SUFFIXES, ScoreTable, read_table, table_of
+from ..results.scores import Better, ScoreResults
 from ..spec.outline import StudyOutline
 from ..spec.tables import SpecTable, TomlTable
 from ..store.durable import read_text
@@ -37,7 +41,7 @@ def load(*places: Place, columns: Sequence[str] = (), better: Better | None = No
         Directories of studies; single files that ``export`` has written; files of the form of
         marl-eval, as BenchMARL and Mava write them, which are put together if no run is in two of
         them; or tables of scores of other tools: CSV, JSON lines, JSON or Parquet, see
-        `nested_agents.studies.results.foreign`.
+        `nested_agents.studies.results.foreign_tables`.
         Parts of one study, with specs that differ only in their seeds, are joined. Conditions of
         several studies with equal labels get the name of their directory. The first study
         determines the analysis.
@@ -59,7 +63,7 @@ def load(*places: Place, columns: Sequence[str] = (), better: Better | None = No
     expect_each("pairs of a role and a column, ROLE=COLUMN", str, columns=columns)
     paths = [Path(place) for place in places]
     _check_distinct(paths)
-    roles = foreign.parse_roles(columns)
+    roles = parse_roles(columns)
     opened = [_open(path) for path in paths]
     if roles and not any(isinstance(own, ScoreTable) for own in opened):
         raise SpecError(f"columns: are of tables, {', '.join(SUFFIXES)}")
@@ -150,7 +154,7 @@ def _roles(columns: RoleColumns) -> Roles:
     return {r: c for r, c in given.items() if isinstance(c, str | Sequence)}
 
 
-Opened = StudyResults | ScoreTable | list[marl_eval.AlgorithmRun]
+Opened = StudyResults | ScoreTable | Runs
 """Content of a path: a study, a table, or runs in the form of marl-eval."""
 
 
@@ -169,20 +173,17 @@ def _open(path: Path) -> Opened:
             store.verify()
             return StudyResults.of(store)
     try:
-        file = parse(read_text(path))
-        if isinstance(file.content, list):
+        text = read_text(path)
+        file = read_json(text)
+        if isinstance(file, list):
             return read_table(path)
-        if "results_version" not in file.table():
-            return marl_eval.runs_of(file)
-        return _of_published(path, file)
-    except SpecError:
-        raise
+        if not isinstance(file, dict) or "results_version" not in file:
+            return read_runs(file)
+        kept = published.loads(text)
     except (OSError, ValueError, RecursionError) as error:
+        if isinstance(error, SpecError):
+            raise
         raise SpecError(f"{path}: holds no published results: {error}") from None
-
-
-def _of_published(path: Path, file: JsonValue) -> StudyResults:
-    kept = published.read_file(file)
     remarks = (f"{path}: {kept.note}",) if kept.note else ()
     sources = Sources(path.parent, brought_by=str(path))
     return StudyResults(kept.outline, kept.results, (), remarks, sources)
@@ -192,11 +193,10 @@ def _results_of(
     paths: Sequence[Path], opened: Sequence[Opened], roles: Roles, better: Better
 ) -> dict[Path, StudyResults]:
     """Return the results of what paths hold; runs of several files are put together."""
-    runs = {path: own for path, own in zip(paths, opened, strict=True) if isinstance(own, list)}
-    keys = [run.key for own in runs.values() for run in own]
-    if len(runs) > 1 and len({*keys}) == len(keys):
-        first = next(iter(runs))
-        runs = {first: [run for own in runs.values() for run in own]}
+    runs = {path: own for path, own in zip(paths, opened, strict=True) if isinstance(own, Runs)}
+    names = [name for own in runs.values() for name in own.names]
+    if len(runs) > 1 and len({*names}) == len(names):
+        runs = {next(iter(runs)): join_runs(list(runs.values()))}
     loaded: dict[Path, StudyResults] = {}
     for path, own in zip(paths, opened, strict=True):
         if isinstance(own, StudyResults):
@@ -204,29 +204,31 @@ def _results_of(
         elif isinstance(own, ScoreTable):
             loaded[path] = _of_table(own, path, roles, better)
         elif path in runs:
-            loaded[path] = _of_runs(path, runs[path], better)
+            loaded[path] = _of_runs(runs[path], path, better)
     return loaded
 
 
 def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better) -> StudyResults:
     """Return the results of a table of scores, or of an exported one; messages name its file."""
-    before = f"{path}: " if path else ""
-    measure = None
-    with refused(before):
-        if exported.is_exported(table) and roles.keys() <= {"score"}:
+    with refused(f"{path}: " if path else ""):
+        if is_exported(table) and roles.keys() <= {"score"}:
             _check_better(better)
-            header = published.header_beside(path) if path else None
-            own = exported.results_of(table, header and header.description)
-            outline = header.outline if header else _outline(own.conditions)
-            results, notes = own.results, own.notes
-            if header and path:
-                results, notes = header.limited(results), (*header.remarks(path), *notes)
+            header = Header.beside(path) if path else None
             measure = next(iter(map(str, roles.values())), None)
-        else:
-            columns = ScoreColumns.of(roles, table.columns)
-            outline, results, notes = foreign.results_of(table, columns, better)
-    remarks = tuple(f"{before}{line}" for line in notes)
-    return StudyResults(outline, results, (), remarks, _defaults=Defaults(measure))
+            return _of_scores(read_export(table, header), path, header, measure)
+        columns = ScoreColumns.of(roles, table.columns)
+        return _of_scores(read_scores(table, columns, better), path)
+
+
+def _of_runs(runs: Runs, path: Path, better: Better) -> StudyResults:
+    """Return the results of runs of the form of marl-eval."""
+    header = Header.beside(path)
+    if header is not None and not is_exported_by(runs, header):
+        header = None
+    with refused(f"{path}: "):
+        if header is not None:
+            _check_better(better)
+        return _of_scores(results_of_runs(runs, better, header), path, header)
 
 
 def _check_better(better: Better) -> None:
@@ -238,29 +240,22 @@ def _check_better(better: Better) -> None:
         )
 
 
-def _outline(conditions: Mapping[str, Mapping[str, object]]) -> StudyOutline:
-    """Return the outline of results without a known spec."""
+def _of_scores(
+    read: ScoreResults,
+    path: Path | None,
+    header: Header | None = None,
+    measure: str | None = None,
+) -> StudyResults:
+    """Return the results of a file of scores as those of a study."""
+    results, notes = read.results, read.notes
     table = {"study": "learning-curve", "seeds": 1, "episodes": 0, "steps": 0, "evaluation": 1}
-    return StudyOutline.noted(table, conditions)
-
-
-def _of_runs(path: Path, runs: Sequence[marl_eval.AlgorithmRun], better: Better) -> StudyResults:
-    """Return the results of runs of the form of marl-eval."""
-    header = published.header_beside(path)
-    known = header.columns if header else {}
-    names = {marl_eval.exported_name(condition) for condition in known}
-    is_exported = header is not None and {run.algorithm for run in runs} <= names
-    with refused(f"{path}: "):
-        if header is not None and is_exported:
-            _check_better(better)
-            own = marl_eval.results_of(runs, better, known, header.measures)
-            outline, results = header.outline, header.limited(own.results)
-            notes = (*header.remarks(path), *own.notes)
-        else:
-            own = marl_eval.results_of(runs, better)
-            outline, results, notes = _outline(own.results.columns), own.results, own.notes
-    remarks = tuple(f"{path}: {line}" for line in notes)
-    return StudyResults(outline, results, (), remarks, _defaults=Defaults(by=own.by))
+    outline = StudyOutline.noted(table, results.columns)
+    if header is not None and path is not None:
+        outline = header.outline
+        results = header.limited(results)
+        notes = (*header.remarks(path), *notes)
+    remarks = tuple(f"{path}: {line}" if path else line for line in notes)
+    return StudyResults(outline, results, (), remarks, _defaults=Defaults(measure, read.by))
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:

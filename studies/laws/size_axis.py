@@ -10,7 +10,7 @@ import numpy as np
 from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..results.results import Results
-from ..results.score_files import NUMBER
+from ..results.score_tables import NUMBER
 from ..spec.tables import label_but
 
 MAX_SIZE = 1_000_000_000

@@ -19,7 +19,7 @@ from .notation import wrapped
 from .power_text import power_lines
 from .recovery import RECOVERY, recovery_by_seed
 from .results import SECONDS, STEPS, Results, describe_number, row_means
-from .series import LAST_STEP
+from .scores import LAST_STEP
 from .statistics import Array, Estimate, bootstrap, exactly, rate
 
 DIFFERENCE_TITLES = {True: "difference", False: "difference (independent samples)"}

@@ -13,10 +13,18 @@ from ...core.interface.measures import NO_SUCCESS, RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import show
 from ..spec.tables import SpecTable
-from .foreign import score_kind
-from .long_form import KEYS, pack, plain_levels, refuse_repeated, whole_names
-from .results import DONE, TRIAL_COLUMNS, Results, assemble
-from .score_files import NUMBER, ScoreTable
+from .published import Header
+from .results import DONE, TRIAL_COLUMNS, assemble
+from .score_tables import NUMBER, ScoreTable
+from .scores import (
+    KEYS,
+    ScoreResults,
+    measure_of,
+    plain_levels,
+    refuse_repeated,
+    results_of,
+    whole_names,
+)
 from .spreadsheet import harmless
 
 EPISODES = ("condition", "seed", "phase", "episode", "steps")
@@ -26,19 +34,12 @@ TRIALS = ("condition", "seed", "state", "identity")
 
 
 class Description(NamedTuple):
-    """Description of an exported study besides its rows."""
+    """What a table of an exported study does not say of its columns."""
 
-    conditions: Mapping[str, SpecTable]
+    columns: Mapping[str, SpecTable]
     """Swept keys by condition, in the order of the study."""
     measures: Sequence[Measure]
-
-
-class Exported(NamedTuple):
-    """Results of an exported table, with remarks."""
-
-    results: Results
-    conditions: Mapping[str, SpecTable]
-    notes: tuple[str, ...]
+    notes: Sequence[str] = ()
 
 
 def is_exported(table: ScoreTable) -> bool:
@@ -47,7 +48,7 @@ def is_exported(table: ScoreTable) -> bool:
     return "score" not in names and ({*EPISODES} <= names or {*TRIALS} <= names)
 
 
-def results_of(table: ScoreTable, known: Description | None) -> Exported:
+def read_export(table: ScoreTable, header: Header | None) -> ScoreResults:
     """Return the results of an exported table, in any order of its rows and columns.
 
     Raises
@@ -55,101 +56,104 @@ def results_of(table: ScoreTable, known: Description | None) -> Exported:
     SpecError
         If a cell is not what was exported; one line names its line and column.
     """
-    labels = table.filled("condition")
-    swept = _swept(table, labels, known)
-    conditions, labels = _conditions(table, labels, swept, known)
-    if {*TRIALS} <= {*table.columns}:
-        return _trials(table, conditions, labels, swept)
-    keys = {
-        "condition": labels,
-        "phase": table.filled("phase"),
-        "seed": whole_names(table.filled("seed")),
-        "episode": _whole(table, "episode"),
-    }
-    names = [name for name in table.columns if name not in (*EPISODES, *swept)]
-    values = {name: table.numbers(name) for name in names}
-    frame = pd.DataFrame({**keys, "steps": _whole(table, "steps"), **values})
-    refuse_repeated(table, frame, {key: key for key in KEYS})
-    notes: list[str] = []
-    if known is None:
-        measures, notes = _measures(frame, names)
+    if header is None:
+        known = _describe(table)
     else:
-        measures = [m for m in known.measures if m.name in names]
-        missing = ", ".join(m.name for m in known.measures if m.name not in names)
-        notes = [f"no column {missing}, which study.json has"] if missing else []
-    return Exported(pack(frame, conditions, measures), conditions, tuple(notes))
-
-
-def _trials(
-    table: ScoreTable,
-    conditions: Mapping[str, SpecTable],
-    labels: pd.Series,
-    swept: Sequence[str],
-) -> Exported:
-    """Return the numbers of whole trials; those of trials that have not finished are left out."""
-    frame = pd.DataFrame({"condition": labels, "seed": whole_names(table.filled("seed"))})
-    numbers = [name for name in table.columns if name not in (*TRIAL_COLUMNS, *swept)]
-    frame = frame.assign(
-        state=table.filled("state"), **{name: table.numbers(name) for name in numbers}
+        missing = [m.name for m in header.measures if m.name not in table.columns]
+        notes = [f"no column {', '.join(missing)}, which study.json has"] if missing else []
+        present = [m for m in header.measures if m.name not in missing]
+        known = Description(header.columns, present, notes)
+    written = {text: c for c in known.columns for text in (c, str(harmless(c)))}
+    cells = table.names("condition")
+    unknown = ": must be a condition of study.json in its folder"
+    table.refuse(~cells.isin(list(written)), "condition", unknown)
+    keys = pd.DataFrame({"condition": cells.map(written), "seed": whole_names(table.names("seed"))})
+    swept = {key for row in known.columns.values() for key in row}
+    _check_levels(table, keys["condition"], known.columns)
+    if {*TRIALS} <= {*table.columns}:
+        return _read_trials(table, keys, known.columns)
+    scores = keys.assign(
+        phase=table.names("phase"), episode=_whole(table, "episode"), steps=_whole(table, "steps")
     )
-    refuse_repeated(table, frame, {key: key for key in ("condition", "seed")})
-    results = assemble([], [frame], (), conditions, (), ())
-    unfinished = int((frame["state"] != DONE).sum())
-    note = f"{unfinished} of {len(frame)} trials have not finished: left out"
-    return Exported(results, conditions, (note,) if unfinished else ())
+    values = {n: table.numbers(n) for n in table.columns if n not in (*EPISODES, *swept)}
+    scores = scores.assign(**values)
+    refuse_repeated(table, scores, {key: key for key in KEYS})
+    return ScoreResults(results_of(scores, known.columns, known.measures), tuple(known.notes))
 
 
-def _swept(table: ScoreTable, labels: pd.Series, known: Description | None) -> list[str]:
-    """Return the columns that are swept keys.
+def _read_trials(
+    table: ScoreTable, keys: pd.DataFrame, columns: Mapping[str, SpecTable]
+) -> ScoreResults:
+    """Return the numbers of whole trials; those of trials that have not finished are left out."""
+    refuse_repeated(table, keys, {"condition": "condition", "seed": "seed"})
+    others = {*TRIAL_COLUMNS, *(key for row in columns.values() for key in row)}
+    numbers = {name: table.numbers(name) for name in table.columns if name not in others}
+    trials = keys.assign(state=table.names("state"), **numbers)
+    unfinished = int((trials["state"] != DONE).sum())
+    note = f"{unfinished} of {len(trials)} trials have not finished: left out"
+    results = assemble([], [trials], (), columns, (), ())
+    return ScoreResults(results, (note,) if unfinished else ())
 
-    Where the study is not known, these are the columns before the seed or, if columns are in
-    another order, those that are constant within each condition.
+
+def _describe(table: ScoreTable) -> Description:
+    """Return the description of a table without ``study.json``.
+
+    Swept keys are the columns before the seed or, if columns are in another order, those that are
+    constant within each condition.
     """
     names = table.columns
-    if known is not None:
-        keys = {key for row in known.conditions.values() for key in row}
-        return [name for name in names if name in keys]
+    labels = table.names("condition")
     first, seed = names.index("condition"), names.index("seed")
     if first == 0 and [n for n in names if n in EPISODES] in ([*EPISODES], ["condition", "seed"]):
-        return names[1:seed]
-    others = [n for n in names if n not in (*EPISODES, *TRIAL_COLUMNS, SUCCESS.name, RETURN.name)]
-    groups = {name: table.text(name).groupby(labels).nunique() for name in others}
-    return [name for name, counts in groups.items() if (counts == 1).all()]
-
-
-def _conditions(
-    table: ScoreTable, labels: pd.Series, swept: Sequence[str], known: Description | None
-) -> tuple[Mapping[str, SpecTable], pd.Series]:
-    """Return the conditions with their swept keys, and the label of each row."""
-    if known is not None:
-        written = {str(harmless(condition)): condition for condition in known.conditions}
-        strange = ~labels.isin(list(written)).to_numpy()
-        if strange.any():
-            row = int(strange.argmax())
-            allowed = "a condition of study.json in its folder"
-            raise table.refusal(row, "condition", labels[row], allowed)
-        labels = labels.map(written)
-        _check_levels(table, labels, swept, known.conditions)
-        return known.conditions, labels
+        swept = names[1:seed]
+    else:
+        known = (*EPISODES, *TRIAL_COLUMNS, SUCCESS.name, RETURN.name)
+        others = {name: table.text(name) for name in names if name not in known}
+        swept = [n for n, own in others.items() if (own.groupby(labels).nunique() == 1).all()]
     levels = pd.DataFrame({key: plain_levels(table.text(key)) for key in swept}, labels.index)
-    rows = levels.assign(condition=labels).drop_duplicates("condition").to_dict("records")
-    return {row.pop("condition"): row for row in rows}, labels
+    is_first = ~labels.duplicated()
+    rows = levels[is_first].to_dict("records")
+    columns = dict(zip(labels[is_first], rows, strict=True))
+    if not {*EPISODES} <= {*names}:
+        return Description(columns, ())
+    measured = [n for n in names if n not in (*EPISODES, *swept, RETURN.name)]
+    return Description(columns, *_measures(table, labels, measured))
+
+
+def _measures(
+    table: ScoreTable, labels: pd.Series, names: Sequence[str]
+) -> tuple[list[Measure], list[str]]:
+    """Return the measures of an export without a description, and remarks on them."""
+    notes = [
+        "no study.json in its folder: which values are better is known of success and return only"
+    ]
+    keys = pd.DataFrame({"condition": labels, **{key: table.text(key) for key in KEYS[1:]}})
+    measures = []
+    for name in names:
+        values = table.numbers(name)
+        if name != SUCCESS.name:
+            measures.append(measure_of(keys.assign(**{name: values}), name, name, None))
+        elif values.any() or RETURN.name not in table.columns:
+            measures.append(SUCCESS)
+        else:
+            measures.append(NO_SUCCESS)
+    if NO_SUCCESS in measures:
+        notes.append("success: never in any episode; returns are compared")
+    return measures, notes
 
 
 def _check_levels(
-    table: ScoreTable,
-    labels: pd.Series,
-    swept: Sequence[str],
-    conditions: Mapping[str, SpecTable],
+    table: ScoreTable, labels: pd.Series, conditions: Mapping[str, SpecTable]
 ) -> None:
-    """Refuse a swept value that is not the one that study.json has for the row's condition."""
-    for key in swept:
+    """Refuse a swept value that is not the one that is known for the row's condition."""
+    keys = dict.fromkeys(key for row in conditions.values() for key in row)
+    for key in (key for key in keys if key in table.columns):
         cells = pd.DataFrame({"condition": labels, "cell": table.text(key)}).drop_duplicates()
         for row, condition, cell in cells.itertuples():
             value = conditions[condition].get(key, "")
             if isinstance(value, str | int | float) and not _is_spelled(cell, value):
                 allowed = f"{show(value)}, the value of condition {condition!r} in study.json"
-                raise table.refusal(row, key, cell, allowed)
+                table.refuse(labels.index == row, key, f": must be {allowed}")
 
 
 def _is_spelled(cell: str, value: float | str) -> bool:
@@ -162,25 +166,6 @@ def _is_spelled(cell: str, value: float | str) -> bool:
 def _whole(table: ScoreTable, column: str) -> pd.Series:
     """Return a column of whole numbers, none below 0."""
     numbers = table.numbers(column)
-    wrong = ~((numbers >= 0) & (numbers % 1 == 0)).to_numpy()
-    if wrong.any():
-        row = int(wrong.argmax())
-        raise table.refusal(row, column, table.frame[column].iloc[row], "a whole number from 0 on")
+    is_whole = (numbers >= 0) & (numbers % 1 == 0)
+    table.refuse(~is_whole, column, ": must be a whole number from 0 on")
     return numbers.astype(int)
-
-
-def _measures(frame: pd.DataFrame, names: Sequence[str]) -> tuple[list[Measure], list[str]]:
-    """Return the measures of an export without a description."""
-    notes = [
-        "no study.json in its folder: which values are better is known of success and return only"
-    ]
-    measures = []
-    for name in names:
-        if name == SUCCESS.name:
-            is_possible = frame[name].any() or RETURN.name not in names
-            measures.append(SUCCESS if is_possible else NO_SUCCESS)
-        elif name != RETURN.name:
-            measures.append(Measure(name, name, is_rate=score_kind(frame, name) == "rate"))
-    if measures and measures[0] == NO_SUCCESS:
-        notes.append("success: never in any episode; returns are compared")
-    return measures, notes

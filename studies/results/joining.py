@@ -15,8 +15,8 @@ from ..errors import SpecError
 from ..spec.outline import StudyOutline
 from ..spec.tables import SpecTable, flat, label
 from ..trials.episodes import join_measures
-from .long_form import name_key
 from .results import Results, StepLimits, assemble
+from .scores import name_key
 
 Part = tuple[StudyOutline, Results]
 """Outline and results of a part."""

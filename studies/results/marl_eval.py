@@ -13,24 +13,37 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from itertools import chain
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from ...core.interface.measures import NO_SUCCESS, RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ..errors import SpecError
-from ..spec.tables import SpecTable
-from .foreign import Better, score_kind
-from .json_values import JsonValue
-from .long_form import KEYS, WHOLE, pack, sort_labels, whole_names
+from .json_files import Finite, Json, explain
+from .published import Header
 from .results import Results
-from .series import LAST_STEP, last_common_step, left_out_note, step_note
+from .scores import (
+    KEYS,
+    LAST_STEP,
+    WHOLE,
+    Better,
+    ScoreResults,
+    at_last_step,
+    joined_notes,
+    left_out_note,
+    measure_of,
+    results_of,
+    sort_labels,
+    whole_names,
+)
 
-STEP = re.compile(r"step_(\d+)", re.IGNORECASE | re.ASCII)
+STEP = re.compile(r"step_0*(\d+)", re.IGNORECASE | re.ASCII)
 """Key of a step."""
 ABSOLUTE = "absolute_metrics"
-NO_METRICS = ("step_count", "elapsed_time")
+STEP_COUNT = "step_count"
 SEED = "seed_"
 """Prefix of a run's name, before its seed."""
 STEPS = "steps"
@@ -95,33 +108,62 @@ def _exported_runs(results: Results, condition: str) -> Iterator[tuple[str, dict
         training = own.get("training", {})
         steps = np.cumsum(training.get("steps", [])).astype(int).tolist()
         run: dict[str, Any] = {
-            f"step_{k}": {"step_count": n, **{name: [v[k]] for name, v in training.items()}}
+            f"step_{k}": {STEP_COUNT: n, **{name: [v[k]] for name, v in training.items()}}
             for k, n in enumerate(steps)
         }
         yield f"{SEED}{seed}", run | {ABSOLUTE: own.get("evaluation", {})}
 
 
-class AlgorithmRun(NamedTuple):
-    """Measurements of one run of an algorithm on a task."""
+def _as_list(value: object) -> object:
+    """Return what was measured once or several times, as a list."""
+    return value if isinstance(value, list) else [value]
 
-    task: str
-    """Environment and task."""
-    algorithm: str
-    name: str
-    series: dict[str, dict[int, list[float]]]
-    """Measured values by metric and step count."""
-    absolute: dict[str, list[float]]
-    """Absolute metrics by name."""
-    ignored: tuple[str, ...]
+
+def _without_others(run: object) -> object:
+    """Return a run without its times; keys that are no steps have no metrics."""
+    if not isinstance(run, dict):
+        return run
+    return {key: {} if _is_ignored(key) else _without_time(own) for key, own in run.items()}
+
+
+def _without_time(metrics: object) -> object:
+    if not isinstance(metrics, dict):
+        return metrics
+    return {name: value for name, value in metrics.items() if name != "elapsed_time"}
+
+
+def _is_ignored(key: str) -> bool:
+    return not STEP.fullmatch(key) and key.lower() != ABSOLUTE
+
+
+Metrics = dict[str, Annotated[list[Finite], BeforeValidator(_as_list)]]
+RunTable = Annotated[dict[str, Metrics], BeforeValidator(_without_others)]
+Algorithms = dict[str, Annotated[dict[str, RunTable], Field(min_length=1)]]
+FILE = TypeAdapter(dict[str, dict[str, Algorithms]])
+RUN = ["task", "algorithm", "seed"]
+"""Columns that name a run."""
+
+
+class Runs(NamedTuple):
+    """Measurements of runs of algorithms on tasks, from one file or several."""
+
+    frame: pd.DataFrame
+    """A row for each metric of each step of each run, with the columns `RUN`, ``measure``, ``step``
+    and ``values``, a list. The step of absolute metrics is `FINAL`."""
+    names: tuple[tuple[str, ...], ...]
+    """Task, algorithm and name of every run."""
+    ignored: frozenset[str]
     """Keys that are neither steps nor absolute metrics."""
 
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """Task, algorithm and name of the run."""
-        return self.task, self.algorithm, self.name
+
+def join_runs(parts: Sequence[Runs]) -> Runs:
+    """Return the runs of several files."""
+    frames, names, ignored = zip(*parts, strict=True)
+    whole = pd.concat(frames, ignore_index=True)
+    return Runs(whole, tuple(chain.from_iterable(names)), frozenset().union(*ignored))
 
 
-def runs_of(file: JsonValue) -> list[AlgorithmRun]:
+def read_runs(file: Json) -> Runs:
     """Return the runs of a file.
 
     Raises
@@ -129,74 +171,67 @@ def runs_of(file: JsonValue) -> list[AlgorithmRun]:
     ValueError
         If the file is not of this form; one line names the key and its value.
     """
-    runs = [
-        _run((f"{environment}/{task}", algorithm, name), run)
-        for environment, by_task in file.table().items()
-        for task, by_algorithm in by_task.table().items()
-        for algorithm, runs in by_algorithm.table().items()
-        for name, run in _some(runs).items()
+    try:
+        content = FILE.validate_python(file)
+    except ValidationError as error:
+        raise ValueError(explain(error, file)) from None
+    runs = {
+        (environment, task, algorithm, name): run
+        for environment, tasks in content.items()
+        for task, algorithms in tasks.items()
+        for algorithm, own in algorithms.items()
+        for name, run in own.items()
+    }
+    rows = [
+        (f"{e}/{t}", *names, *row)
+        for (e, t, *names), run in runs.items()
+        for row in _rows(run, ".".join((e, t, *names)))
     ]
-    if not any({*run.series, *run.absolute} - {STEPS} for run in runs):
+    frame = pd.DataFrame(rows, columns=[*RUN, "measure", "step", "values"])
+    if not {*frame["measure"]} - {STEPS}:
         raise ValueError("no run has measured anything")
-    return runs
+    ignored = frozenset(key for run in runs.values() for key in run if _is_ignored(key))
+    return Runs(frame, tuple((f"{e}/{t}", *names) for e, t, *names in runs), ignored)
 
 
-def _some(runs: JsonValue) -> dict[str, JsonValue]:
-    if not runs.table():
-        raise runs.refusal("a table of one run or more")
-    return runs.table()
-
-
-def _run(key: tuple[str, str, str], run: JsonValue) -> AlgorithmRun:
-    series: dict[str, dict[int, list[float]]] = {}
-    absolute: dict[str, list[float]] = {}
-    known: dict[object, str] = {}
-    ignored = []
-    for name, own in run.table().items():
-        step = STEP.fullmatch(name)
-        place = int(step[1]) if step else name.lower()
-        if not step and place != ABSOLUTE:
-            ignored.append(name)
+def _rows(run: Mapping[str, Metrics], path: str) -> Iterator[tuple[str, float, list[float]]]:
+    """Yield metric, step and values of the steps and the absolute metrics of a run."""
+    keys: dict[str, str] = {}
+    known = set[tuple[str, float]]()
+    for key, metrics in run.items():
+        if _is_ignored(key):
             continue
-        if place in known:
-            raise ValueError(f"{own.key}: is {known[place]}, too")
-        known[place] = name
-        metrics = {n: v for n, v in own.table().items() if n not in NO_METRICS}
-        values = {n: listed for n, v in metrics.items() if (listed := _values(v))}
-        if not step:
-            absolute = values
-            continue
-        count = own.child("step_count")
-        for metric, listed in values.items():
-            at = series.setdefault(metric, {})
-            if count.whole() in at:
-                raise count.refusal("a step count that no other step of the run has")
-            at[count.whole()] = listed
-    return AlgorithmRun(*key, series, absolute, tuple(ignored))
+        match = STEP.fullmatch(key)
+        if (first := keys.setdefault(match[1] if match else ABSOLUTE, key)) != key:
+            raise ValueError(f"{path}.{key}: is {first}, too")
+        step = _step_count(metrics, f"{path}.{key}") if match else FINAL
+        for metric, values in metrics.items():
+            if metric == STEP_COUNT or not values:
+                continue
+            if (metric, step) in known:
+                raise ValueError(
+                    f"{path}.{key}.{STEP_COUNT} = {step}: another step of the run has it"
+                )
+            known.add((metric, step))
+            yield metric, step, values
 
 
-def _values(metric: JsonValue) -> list[float]:
-    """Return what was measured once or several times, as a list."""
-    if isinstance(metric.content, list):
-        return metric.array(1).astype(float).tolist()
-    return [float(metric.number())]
+def _step_count(metrics: Metrics, path: str) -> float:
+    if STEP_COUNT not in metrics:
+        raise ValueError(f"{path}.{STEP_COUNT}: is missing")
+    count, *others = metrics[STEP_COUNT] or [-1]
+    if others or count < 0 or count % 1:
+        raise ValueError(f"{path}.{STEP_COUNT} = {count}: must be a whole number from 0 on")
+    return count
 
 
-class Evaluations(NamedTuple):
-    """Results of a file, and what was left out or chosen when it was read."""
-
-    results: Results
-    notes: tuple[str, ...]
-    by: str | None
-    """Key by which conditions are compared: the algorithm, if there are several tasks."""
+def is_exported_by(runs: Runs, header: Header) -> bool:
+    """Return whether all runs are of conditions of a study."""
+    known = {exported_name(condition) for condition in header.columns}
+    return {algorithm for _, algorithm, _ in runs.names} <= known
 
 
-def results_of(
-    runs: Sequence[AlgorithmRun],
-    better: Better = "higher",
-    conditions: Mapping[str, SpecTable] | None = None,
-    measures: Sequence[Measure] = (),
-) -> Evaluations:
+def results_of_runs(runs: Runs, better: Better, header: Header | None) -> ScoreResults:
     """Return the results of runs; the keys of their conditions are ``algorithm`` and ``task``.
 
     Parameters
@@ -205,36 +240,37 @@ def results_of(
         Runs of any algorithms and tasks.
     better
         Which values are better.
-    conditions, measures
-        What is known of an exported study: its conditions with their swept keys, and its measures.
+    header
+        Description of the study that exported the runs, if one did.
     """
-    labels = _labels(runs, conditions)
-    columns = conditions or _columns(runs, labels)
-    frame = _long(runs, labels)
-    metrics = sorted(frame["measure"].unique())
-    ignored = sorted({key for run in runs for key in run.ignored})
-    notes = [f"keys that are no steps are ignored: {', '.join(ignored)}"] if ignored else []
-    empty = sum(not (run.series or run.absolute) for run in runs)
-    notes += [f"{empty} of {len(runs)} runs have measured nothing: left out"] if empty else []
-    is_exported = bool(conditions) and _counts_episodes(runs)
-    phases, chosen = _phases(frame, is_exported)
+    labels = _labels(runs, header)
+    columns = header.columns if header else _columns(labels)
+    frame = _labeled(runs.frame, labels)
+    n_empty = len(runs.names) - len(frame[RUN].drop_duplicates())
+    notes = []
+    if runs.ignored:
+        notes.append(f"keys that are no steps are ignored: {', '.join(sorted(runs.ignored))}")
+    if n_empty:
+        notes.append(f"{n_empty} of {len(runs.names)} runs have measured nothing: left out")
+    phases, chosen = _phases(frame, is_exported=header is not None and _counts_episodes(frame))
     wide = pd.concat(phases).pivot(index=KEYS, columns="measure", values="value").reset_index()
     wide["seed"] = whole_names(_without_prefix(wide["seed"]))
-    known = measures or _measures(wide, metrics, better)
-    if not measures and known[0] == NO_SUCCESS and SUCCESS.name in metrics:
+    metrics = sorted(frame["measure"].unique())
+    measures = header.measures if header else _measures(wide, metrics, better)
+    if not header and measures[0] == NO_SUCCESS and SUCCESS.name in metrics:
         notes.append(NEVER)
-    tasks = {run.task for run in runs}
-    is_crossed = len(tasks) > 1 and len(columns) > len({run.algorithm for run in runs})
-    results = pack(wide, columns, known)
-    return Evaluations(results, (*notes, *chosen), "algorithm" if is_crossed else None)
+    several_tasks = len({task for task, _ in labels}) > 1
+    is_crossed = several_tasks and len(columns) > len({algorithm for _, algorithm in labels})
+    results = results_of(wide, columns, measures)
+    return ScoreResults(results, (*notes, *chosen), "algorithm" if is_crossed else None)
 
 
-def _labels(
-    runs: Sequence[AlgorithmRun], conditions: Mapping[str, SpecTable] | None
-) -> dict[tuple[str, str], str]:
+def _labels(runs: Runs, header: Header | None) -> dict[tuple[str, str], str]:
     """Return the label of each algorithm on each task; the task is named if that is necessary."""
-    pairs = dict.fromkeys((run.task, run.algorithm) for run in runs)
-    exported = {exported_name(condition): condition for condition in conditions or ()}
+    pairs = dict.fromkeys((task, algorithm) for task, algorithm, _ in runs.names)
+    exported = (
+        {exported_name(condition): condition for condition in header.columns} if header else {}
+    )
     times = Counter(algorithm for _, algorithm in pairs)
     labels = {
         (task, algorithm): algorithm if times[algorithm] == 1 else f"{algorithm}, {task}"
@@ -245,10 +281,8 @@ def _labels(
     return {pair: exported.get(label, label) for pair, label in labels.items()}
 
 
-def _columns(
-    runs: Sequence[AlgorithmRun], labels: Mapping[tuple[str, str], str]
-) -> dict[str, dict[str, object]]:
-    several = len({run.task for run in runs}) > 1
+def _columns(labels: Mapping[tuple[str, str], str]) -> dict[str, dict[str, object]]:
+    several = len({task for task, _ in labels}) > 1
     columns: dict[str, dict[str, object]] = {
         label: {"algorithm": algorithm, **({"task": task} if several else {})}
         for (task, algorithm), label in labels.items()
@@ -256,54 +290,44 @@ def _columns(
     return {label: columns[label] for label in sort_labels(columns)}
 
 
-def _long(runs: Sequence[AlgorithmRun], labels: Mapping[tuple[str, str], str]) -> pd.DataFrame:
-    """Return a row for each metric of each step of each run; the step of absolute metrics is -1.
-
-    Values are lists. `episode` is the number of the step in its run.
-    """
-    rows = []
-    for run in runs:
-        key = labels[run.task, run.algorithm], run.task, run.name
-        counts = sorted({count for at in run.series.values() for count in at})
-        place = {count: k for k, count in enumerate(counts)}
-        for metric, at in run.series.items():
-            rows += [(*key, metric, count, place[count], own) for count, own in at.items()]
-        rows += [(*key, metric, FINAL, 0, own) for metric, own in run.absolute.items()]
-    names = ["condition", "task", "seed", "measure", "step", "episode", "values"]
-    frame = pd.DataFrame(rows, columns=names)
-    return frame.assign(value=[float(np.mean(own)) for own in frame["values"]])
+def _labeled(frame: pd.DataFrame, labels: Mapping[tuple[str, str], str]) -> pd.DataFrame:
+    """Return measurements with their condition, mean value and number of the step in the run."""
+    pairs = zip(frame["task"], frame["algorithm"], strict=True)
+    steps = frame["step"].where(frame["step"] != FINAL)
+    return frame.assign(
+        condition=[labels[pair] for pair in pairs],
+        value=frame["values"].map(np.mean).astype(float),
+        episode=steps.groupby([frame[name] for name in RUN]).rank("dense").fillna(1).astype(int)
+        - 1,
+    )
 
 
-def _phases(frame: pd.DataFrame, is_exported: bool) -> tuple[list[pd.DataFrame], list[str]]:
-    """Return the scores of each phase in long form, and notes on what is compared."""
+def _phases(frame: pd.DataFrame, *, is_exported: bool) -> tuple[list[pd.DataFrame], list[str]]:
+    """Return the scores of each phase, and notes on what is compared."""
     is_final = frame["step"] == FINAL
     series = frame[~is_final].assign(phase="training")
     final = frame[is_final].assign(phase="evaluation")
     if is_exported:  # by this toolkit: a step is an episode
-        return [series, *_final(final)], []
-    chosen: dict[str, list[str]] = {}
+        return [series, _final(final)], []
+    notes = []
     phases = []
     for (metric, _), every in frame.groupby(["measure", "task"]):
-        own = every[every["step"] != FINAL].assign(phase=LAST_STEP)
+        own = series.loc[every.index.intersection(series.index)]
         absolute = final.loc[every.index.intersection(final.index)]
-        step = last_common_step(own) if len(own) else None
-        rows = own[own["step"] == step]
+        rows, note = at_last_step(own, STEP_COUNT)
         if {*absolute["condition"]} == {*every["condition"]}:
-            phases += _final(absolute)
-            text = f"{ABSOLUTE} are compared by default{_best_note(own, absolute)}"
-            text += left_out_note(every, absolute)
-            text += f"; --phase '{LAST_STEP}' compares step_count {step:.0f}" if step else ""
-        elif step is None:
-            text = "most runs of every algorithm share no step_count: not compared"
-        else:
-            text = step_note(every, rows, f"step_count {step:.0f}")
-        if step is not None:
-            phases += [rows.assign(episode=0), _curves(own[own["step"] <= step], rows)]
-        chosen.setdefault(text, []).append(str(metric))
+            phases.append(_final(absolute))
+            note = f"{ABSOLUTE} are compared by default{_best_note(own, absolute)}"
+            note += left_out_note(every, absolute)
+            if len(rows):
+                note += f"; --phase '{LAST_STEP}' compares {STEP_COUNT} {rows['step'].iloc[0]:.0f}"
+        if len(rows):
+            phases.append(rows.assign(phase=LAST_STEP, episode=0))
+            phases.append(_curves(own[own["step"] <= rows["step"].iloc[0]], rows))
+        notes.append((str(metric), note))
     if not phases:
-        raise ValueError("; ".join(f"{', '.join(names)}: {t}" for t, names in chosen.items()))
-    chosen = {text: [*dict.fromkeys(names)] for text, names in chosen.items()}
-    return phases, [f"{', '.join(names)}: {text}" for text, names in chosen.items()]
+        raise ValueError("; ".join(joined_notes(notes)))
+    return phases, joined_notes(notes)
 
 
 def _best_note(series: pd.DataFrame, absolute: pd.DataFrame) -> str:
@@ -316,21 +340,16 @@ def _best_note(series: pd.DataFrame, absolute: pd.DataFrame) -> str:
     return " (the best single value of each run)" if is_best and (many > 1).all() else ""
 
 
-def _final(absolute: pd.DataFrame) -> list[pd.DataFrame]:
+def _final(absolute: pd.DataFrame) -> pd.DataFrame:
     """Return absolute metrics with an episode for each value, or their means.
 
     Means are taken where the runs of a condition have different numbers of values.
     """
-    phases = []
-    for _, own in absolute.groupby("condition", sort=False):
-        if own["values"].map(len).nunique() == 1:
-            counts = range(len(own["values"].iloc[0]))
-            own = own.drop(columns="value").assign(episode=[[*counts]] * len(own))
-            own = own.explode(["episode", "values"]).rename(columns={"values": "value"})
-            phases.append(own.astype({"episode": int, "value": float}))
-        else:
-            phases.append(own)
-    return phases
+    counts = absolute["values"].map(len).groupby(absolute["condition"]).transform("nunique")
+    lists = absolute["values"].where(counts == 1, absolute["value"].map(lambda mean: [mean]))
+    episodes = lists.map(lambda values: [*range(len(values))])
+    rows = absolute.assign(value=lists, episode=episodes).explode(["episode", "value"])
+    return rows.astype({"episode": int, "value": float})
 
 
 def _curves(series: pd.DataFrame, kept: pd.DataFrame) -> pd.DataFrame:
@@ -340,43 +359,34 @@ def _curves(series: pd.DataFrame, kept: pd.DataFrame) -> pd.DataFrame:
     counts = own.groupby(["condition", "step"])["seed"].transform("nunique")
     own = own[counts == own.groupby("condition")["seed"].transform("nunique")]
     episode = own.groupby(["condition", "seed"])["step"].rank().astype(int) - 1
-    return own.assign(phase="training", episode=episode)
+    return own.assign(episode=episode)
 
 
-def _counts_episodes(runs: Sequence[AlgorithmRun]) -> bool:
+def _counts_episodes(frame: pd.DataFrame) -> bool:
     """Return whether steps are episodes, so that step counts are cumulative lengths."""
-    return any(run.series for run in runs) and all(_adds_up(run) for run in runs)
-
-
-def _adds_up(run: AlgorithmRun) -> bool:
-    lengths = {count: sum(own) for count, own in sorted(run.series.get(STEPS, {}).items())}
-    counts = {count for at in run.series.values() for count in at}
-    return counts == {*lengths} and [*lengths] == np.cumsum([*lengths.values()]).tolist()
+    series = frame[frame["step"] != FINAL]
+    lengths = series[series["measure"] == STEPS].sort_values("step")
+    ends = lengths["values"].map(sum).groupby([lengths[name] for name in RUN]).cumsum()
+    has_length = len(series.drop_duplicates([*RUN, "step"])) == len(lengths) > 0
+    return has_length and bool((ends == lengths["step"]).all())
 
 
 def _without_prefix(names: pd.Series) -> pd.Series:
     """Return the names of runs without ``seed_``, if all have it before a whole number."""
-    bare = names.str.removeprefix(SEED)
-    is_seed = names.str.startswith(SEED) & bare.map(lambda name: bool(WHOLE.fullmatch(name)))
-    return bare if is_seed.all() else names
+    is_seed = names.str.fullmatch(f"{SEED}({WHOLE.pattern})")
+    return names.str.removeprefix(SEED) if is_seed.all() else names
 
 
-def _measures(wide: pd.DataFrame, metrics: Sequence[str], better: Better) -> list[Measure]:
+def _measures(wide: pd.DataFrame, metrics: Sequence[str], better: Better) -> Sequence[Measure]:
     """Return the measures of metrics; returns are compared unless success is measured."""
-    measures: list[Measure] = []
-    for name in metrics:
-        if name in (STEPS, RETURN.name):
-            continue
-        kind = score_kind(wide, name)
-        if name == SUCCESS.name and kind == "rate":
-            measures.insert(0, SUCCESS)
-        else:
-            measures.append(Measure(name, name, better=better, is_rate=kind == "rate"))
     if RETURN.name in metrics and better == "lower":
         raise ValueError(
             "better = 'lower': the metric return is better if it is higher, allowed: higher, or "
             "another name of the metric"
         )
+    names = [name for name in metrics if name not in (STEPS, RETURN.name)]
+    measures = [measure_of(wide, name, name, better) for name in names]
+    measures.sort(key=lambda measure: measure != SUCCESS)
     if RETURN.name in metrics and (SUCCESS not in measures or not wide[SUCCESS.name].any()):
-        measures = [NO_SUCCESS, *(m for m in measures if m != SUCCESS)]
+        measures = [NO_SUCCESS, *(measure for measure in measures if measure != SUCCESS)]
     return measures

@@ -11,11 +11,22 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, get_args
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    WrapValidator,
+    model_validator,
+)
 
 from ...core.interface.measures import RETURN, Measure
 from ..errors import SpecError
@@ -23,16 +34,213 @@ from ..spec.outline import StudyOutline
 from ..store.database import RESULTS_VERSION, tables
 from ..store.database import SECONDS as PARTS
 from ..store.durable import read_text
-from .exported import Description
-from .json_values import JsonValue, parse
+from .json_files import Finite, explain, read_json
 from .results import SECONDS, Array, Results, StepLimits, from_arrays, pad_rows
 
-GATHERINGS = get_args(Measure.__annotations__["gathering"])
-"""Ways in which the steps of an episode make one number."""
 HEADER = "study.json"
 """Name of the file that describes the study of exported tables."""
 FEW = 100
 """Fewer rows, or values, are always written one by one."""
+MAX_SEEDS = 100_000
+"""Largest number of seeds of a condition."""
+MAX_EPISODES = 1_000_000
+"""Largest number of episodes of a trial."""
+MAX_VERSION = 1_000_000
+"""Largest version of results."""
+MAX_VALUES = 20_000_000
+"""Largest number of values of a file that are written as one for all or as text.
+
+Some characters could otherwise fill any memory."""
+
+
+def _spell_out(seeds: object) -> object:
+    """Return the list of the seeds from 0 on that are written as their number."""
+    if type(seeds) is not int:
+        return seeds
+    if not 1 <= seeds <= MAX_SEEDS:
+        raise ValueError(f"must be a whole number from 1 to {MAX_SEEDS}, or a list")
+    return list(range(seeds))
+
+
+def _check_distinct(seeds: list[int]) -> list[int]:
+    if len({*seeds}) < len(seeds):
+        raise ValueError("must be a list of distinct seeds")
+    return seeds
+
+
+def _check_measures(measures: tuple[Measure, ...]) -> tuple[Measure, ...]:
+    names = {measure.name for measure in measures}
+    if len(names | {"steps", "return"}) < len(measures) + 2:
+        raise ValueError("must be of distinct names, none of them steps or return")
+    return measures
+
+
+Count = Annotated[int, Field(ge=0, le=MAX_EPISODES)]
+Seeds = Annotated[
+    list[Annotated[int, Field(ge=0, lt=2**63)]],
+    BeforeValidator(_spell_out),
+    Field(min_length=1, max_length=MAX_SEEDS),
+    AfterValidator(_check_distinct),
+]
+Bits = Annotated[str, Field(pattern="^[01]*$")]
+"""Zeros and ones of the episodes of a seed."""
+Side = Annotated[int, Field(ge=1, le=MAX_EPISODES)]
+
+
+class PackedArray(BaseModel):
+    """An array as one value for all, or as the text of its zeros and ones."""
+
+    all: Finite | None = None
+    flags: Bits | None = None
+    shape: Annotated[list[Side], Field(min_length=1, max_length=2)]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.all is None) is (self.flags is None):
+            raise ValueError("must have either all or flags")
+        if self.flags is not None and len(self.flags) != math.prod(self.shape):
+            raise ValueError(f"must have the shape of its {len(self.flags)} flags")
+        return self
+
+
+def _form_of(value: object) -> str:
+    """Return the tag of the form in which an array is written."""
+    if isinstance(value, dict):
+        return "packed array"
+    first = value[0] if isinstance(value, list) and value else None
+    if isinstance(first, str):
+        return "texts"
+    return "rows" if isinstance(first, list) else "numbers"
+
+
+Packed = Annotated[
+    Annotated[PackedArray, Tag("packed array")]
+    | Annotated[list[Bits], Tag("texts")]
+    | Annotated[list[list[Finite]], Tag("rows")]
+    | Annotated[list[Finite], Tag("numbers")],
+    Discriminator(_form_of),
+]
+"""An array as JSON: numbers of seeds, rows of numbers or texts of bits, or packed."""
+
+
+class CurriculumStage(BaseModel):
+    """Stage of a curriculum."""
+
+    episodes: Count
+
+
+class ConditionKeys(BaseModel):
+    """Keys of a condition that pages read."""
+
+    curriculum: list[CurriculumStage] = []
+
+
+class SpecKeys(ConditionKeys):
+    """Keys of a spec that tables and pages read."""
+
+    study: str
+    seeds: Seeds
+    episodes: Count
+    steps: Count
+    evaluation: Count
+    evaluation_steps: Annotated[int, Field(ge=1, le=MAX_EPISODES)] | None = None
+    overrides: list[ConditionKeys] = []
+
+
+def _keep(table: object, validate: Callable[[object], SpecKeys]) -> object:
+    """Return a spec as it is, after its keys were validated."""
+    validate(table)
+    return table
+
+
+class Header(BaseModel):
+    """Description of a study: what its files say besides numbers."""
+
+    results_version: Annotated[int, Field(ge=1, le=MAX_VERSION)]
+    spec: Annotated[SpecKeys, WrapValidator(_keep)]
+    """The whole spec as a table."""
+    columns: dict[str, dict[str, str | bool | Finite | None]]
+    """Swept keys by condition, in the order of the study."""
+    measures: Annotated[tuple[Measure, ...], AfterValidator(_check_measures)]
+    sha256: dict[str, str] = {}
+    """SHA-256 by name of the tables that were exported with it, as CSV."""
+
+    @classmethod
+    def of(cls, text: str) -> Self:
+        """Return what the text of a JSON file says.
+
+        Raises
+        ------
+        ValueError, RecursionError
+            If it is something else; one line names the key, its value and what is allowed.
+        """
+        file = read_json(text)
+        try:
+            return cls.model_validate_json(text, strict=True)
+        except ValidationError as error:
+            raise ValueError(explain(error, file)) from None
+
+    @classmethod
+    def beside(cls, path: Path) -> Self | None:
+        """Return the header in the folder of an exported file; None if there is none.
+
+        Raises
+        ------
+        SpecError
+            If it is damaged.
+        """
+        place = path.with_name(HEADER)
+        if not place.is_file():
+            return None
+        try:
+            text = read_text(place)
+            file = read_json(text)
+            return (
+                None if isinstance(file, dict) and "results_version" not in file else cls.of(text)
+            )
+        except (OSError, ValueError, RecursionError) as error:
+            raise SpecError(f"{place}: describes no exported study: {error}") from None
+
+    @property
+    def outline(self) -> StudyOutline:
+        """Outline of the study."""
+        return StudyOutline.noted(dict(self.spec), self.columns)
+
+    @property
+    def note(self) -> str | None:
+        """Note on results of another version than this; None for those of this version."""
+        if self.results_version == RESULTS_VERSION:
+            return None
+        return f"results of version {self.results_version}, this is version {RESULTS_VERSION}"
+
+    def remarks(self, path: Path) -> tuple[str, ...]:
+        """Return the note, and that an exported table has been changed."""
+        known = self.sha256.get(path.name)
+        is_changed = known not in (None, hashlib.sha256(path.read_bytes()).hexdigest())
+        changed = f"has been changed since it was exported, says {HEADER}"
+        return (*filter(None, [self.note]), *[changed] * is_changed)
+
+    def limited(self, results: Results) -> Results:
+        """Return results with the limits of the spec."""
+        return replace(results, step_limits=StepLimits.of(self.outline.table))
+
+
+class ResultsFile(Header):
+    """Content of a file of results."""
+
+    seeds: dict[str, Seeds]
+    phases: dict[str, dict[str, dict[str, Packed]]]
+    numbers: dict[str, dict[str, Packed]]
+    usage: dict[str, dict[str, Packed]]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        named = [*self.numbers.values(), *self.usage.values()]
+        named += [own for by_condition in self.phases.values() for own in by_condition.values()]
+        packed = [a for own in named for a in own.values() if isinstance(a, PackedArray)]
+        if sum(math.prod(array.shape) for array in packed) > MAX_VALUES:
+            raise ValueError(f"must be small: at most {MAX_VALUES} values may be packed")
+        return self
 
 
 def dumps(outline: StudyOutline, results: Results) -> str:
@@ -70,72 +278,40 @@ def header(outline: StudyOutline, results: Results) -> dict[str, object]:
     }
 
 
-class Header(NamedTuple):
-    """Content of `header`."""
-
-    outline: StudyOutline
-    columns: dict[str, dict[str, str | float | bool | None]]
-    measures: tuple[Measure, ...]
-    version: int
-    digests: Mapping[str, str]
-    """SHA-256 by name of the tables that were exported with it, as CSV."""
-
-    @property
-    def note(self) -> str | None:
-        """Note on results of another version than this; None for those of this version."""
-        if self.version == RESULTS_VERSION:
-            return None
-        return f"results of version {self.version}, this is version {RESULTS_VERSION}"
-
-    def remarks(self, path: Path) -> tuple[str, ...]:
-        """Return the note, and that an exported table has been changed."""
-        known = self.digests.get(path.name)
-        is_changed = known not in (None, hashlib.sha256(path.read_bytes()).hexdigest())
-        changed = f"has been changed since it was exported, says {HEADER}"
-        return (*filter(None, [self.note]), *[changed] * is_changed)
-
-    def limited(self, results: Results) -> Results:
-        """Return results with the limits of the spec."""
-        return replace(results, step_limits=StepLimits.of(self.outline.table))
-
-    @property
-    def description(self) -> Description:
-        """Description for reading exported tables."""
-        return Description(self.columns, self.measures)
-
-    @classmethod
-    def of(cls, file: JsonValue) -> Header:
-        """Return the header of a file.
-
-        Raises
-        ------
-        ValueError
-            If the file has none.
-        """
-        version = file.child("results_version").whole(1, MOST_VERSION)
-        columns = _columns(file.child("columns"))
-        outline = _outline(file.child("spec"), columns)
-        kept = file.table().get("sha256")
-        digests = {name: own.text() for name, own in kept.table().items()} if kept else {}
-        return cls(outline, columns, _measures(file.child("measures")), version, digests)
+def _pack_seeds(seeds: tuple[int, ...]) -> int | list[int]:
+    """Return many seeds from 0 on as their number."""
+    many = len(seeds) >= FEW and seeds == tuple(range(len(seeds)))
+    return len(seeds) if many else list(seeds)
 
 
-def header_beside(path: Path) -> Header | None:
-    """Return the header in the folder of an exported table; None if there is none.
+def _pack(values: Array, *, is_rate: bool) -> object:
+    is_ragged = bool(np.isnan(values).any())
+    rows = [row[~np.isnan(row)] for row in values]
+    if not is_rate:
+        return [row.tolist() for row in rows] if is_ragged else _constant(values) or values.tolist()
+    flags = ["".join("1" if v else "0" for v in row) for row in rows]
+    if is_ragged or len(flags) < FEW:
+        return flags
+    return {"flags": "".join(flags), "shape": list(values.shape)}
 
-    Raises
-    ------
-    SpecError
-        If it is damaged.
-    """
-    place = path.with_name(HEADER)
-    if not place.is_file():
+
+def _constant(values: Array) -> dict[str, object] | None:
+    """Return many equal values as value and shape; None for other arrays."""
+    if values.size < FEW or not (values == values.flat[0]).all():
         return None
-    try:
-        file = parse(read_text(place))
-        return Header.of(file) if "results_version" in file.table() else None
-    except (OSError, ValueError, RecursionError) as error:
-        raise SpecError(f"{place}: describes no exported study: {error}") from None
+    return {"all": values.flat[0].item(), "shape": list(values.shape)}
+
+
+def _pack_numbers(results: Results, wanted: Callable[[str], bool]) -> dict[str, dict[str, object]]:
+    """Return by condition the numbers of the wanted names; seconds by their part alone."""
+    return {
+        condition: {
+            name.removeprefix(SECONDS): _constant(values) or values.tolist()
+            for name, values in numbers.items()
+        }
+        for condition in results.conditions
+        if (numbers := {n: v for n, v in results.numbers(condition).items() if wanted(n)})
+    }
 
 
 class Published(NamedTuple):
@@ -155,25 +331,84 @@ def loads(text: str) -> Published:
     ValueError, RecursionError
         If it is something else; one line names the key, its value and what is allowed.
     """
-    return read_file(parse(text))
-
-
-def read_file(file: JsonValue) -> Published:
-    """Return the results of a file as `loads` does."""
-    own = Header.of(file)
-    measures = own.measures
-    seeds = {name: _seeds(listed) for name, listed in file.child("seeds").table().items()}
-    for condition in seeds:
-        file.child("columns").child(condition)
-    room = Room()
+    file = ResultsFile.of(text)
+    for condition in file.seeds:
+        if condition not in file.columns:
+            raise ValueError(f"columns.{condition}: is missing")
+    rates = [measure.name for measure in file.measures if measure.is_rate]
     phases = {
-        phase: _arrays(by_condition, seeds, measures, room)
-        for phase, by_condition in file.child("phases").table().items()
+        phase: _arrays(by_condition, f"phases.{phase}", file.seeds, rates)
+        for phase, by_condition in file.phases.items()
     }
-    numbers = _numbers(file.child("numbers"), seeds, (), room)
-    usage = _numbers(file.child("usage"), seeds, PARTS, room)
-    results = own.limited(from_arrays(phases, seeds, numbers, usage, own.columns, measures))
-    return Published(own.outline, results, own.version, own.note)
+    for phase, by_condition in phases.items():
+        for condition, arrays in by_condition.items():
+            _check_episodes(arrays, f"phases.{phase}.{condition}", file.measures)
+    numbers = _arrays(file.numbers, "numbers", file.seeds)
+    usage = {
+        condition: {f"{SECONDS}{n}" if n in PARTS else n: array for n, array in named.items()}
+        for condition, named in _arrays(file.usage, "usage", file.seeds).items()
+    }
+    results = from_arrays(phases, file.seeds, numbers, usage, file.columns, file.measures)
+    return Published(file.outline, file.limited(results), file.results_version, file.note)
+
+
+def _arrays(
+    by_condition: Mapping[str, Mapping[str, Packed]],
+    key: str,
+    seeds: Mapping[str, Sequence[int]],
+    rates: Collection[str] | None = None,
+) -> dict[str, dict[str, Array]]:
+    """Return arrays by condition and name: numbers of trials, or of episodes if rates are given.
+
+    Each must have a row for each seed.
+    """
+    arrays: dict[str, dict[str, Array]] = {condition: {} for condition in by_condition}
+    for condition, named in by_condition.items():
+        own_key = f"{key}.{condition}"
+        if condition not in seeds:
+            raise ValueError(f"{own_key}: is no condition that has seeds")
+        for name, packed in named.items():
+            is_rate = rates is not None and name in rates
+            if _is_text(packed) is not is_rate:
+                allowed = "text of 0 and 1, because it is a rate" if is_rate else "numbers"
+                raise ValueError(f"{own_key}.{name}: must be {allowed}")
+            array = _unpack(packed)
+            n_seeds = len(seeds[condition])
+            if array.ndim != 1 + (rates is not None) or len(array) != n_seeds or not array.size:
+                raise ValueError(
+                    f"{own_key}.{name}: has the shape {array.shape}, must be of {n_seeds} seeds, "
+                    "a row for each"
+                )
+            arrays[condition][name] = array
+    return arrays
+
+
+def _is_text(packed: Packed) -> bool:
+    if isinstance(packed, PackedArray):
+        return packed.flags is not None
+    return bool(packed) and isinstance(packed[0], str)
+
+
+def _unpack(packed: Packed) -> Array:
+    """Return the array; rows of fewer episodes end in NaN."""
+    if not isinstance(packed, PackedArray):
+        rows = [np.array([*map(int, row)] if isinstance(row, str) else row) for row in packed]
+        return pad_rows(rows) if rows and rows[0].ndim else np.array(rows)
+    if packed.flags is not None:
+        return np.array([*map(int, packed.flags)]).reshape(packed.shape)
+    return np.full(packed.shape, packed.all)
+
+
+def _check_episodes(arrays: Mapping[str, Array], key: str, measures: Sequence[Measure]) -> None:
+    """Refuse what was measured in a phase of a condition unless each measure has its episodes."""
+    for name, array in arrays.items():
+        if name not in {"steps", "return", *(measure.name for measure in measures)}:
+            raise ValueError(f"{key}.{name}: no measure is called so")
+        known = array[~np.isnan(array)]
+        if name == "steps" and not ((known == np.rint(known)) & (known >= 0)).all():
+            raise ValueError(f"{key}.steps: must be whole numbers, none below 0")
+    if len({np.isnan(array).tobytes() for array in arrays.values()}) > 1:
+        raise ValueError(f"{key}: must have as many episodes of every measure")
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
@@ -200,226 +435,3 @@ def load(path: Path) -> Published:
         return loads(read_text(path))
     except (OSError, ValueError, RecursionError) as error:
         raise SpecError(f"{path}: holds no published results: {error}") from None
-
-
-def _pack_seeds(seeds: tuple[int, ...]) -> int | list[int]:
-    """Return many seeds from 0 on as their number."""
-    many = len(seeds) >= FEW and seeds == tuple(range(len(seeds)))
-    return len(seeds) if many else list(seeds)
-
-
-Packed = Sequence[object] | dict[str, object]
-"""An array as lists; of many rows, as flags or one value for all, with its shape."""
-
-
-def _pack(values: np.ndarray, *, is_rate: bool) -> Packed:
-    is_ragged = bool(np.isnan(values).any())
-    rows = [row[~np.isnan(row)] for row in values]
-    if not is_rate:
-        return [row.tolist() for row in rows] if is_ragged else _constant(values) or values.tolist()
-    flags = ["".join("1" if v else "0" for v in row) for row in rows]
-    if is_ragged or len(flags) < FEW:
-        return flags
-    return {"flags": "".join(flags), "shape": list(values.shape)}
-
-
-def _constant(values: np.ndarray) -> Packed | None:
-    """Return many equal values as value and shape; None for other arrays."""
-    if values.size < FEW or not (values == values.flat[0]).all():
-        return None
-    return {"all": values.flat[0].item(), "shape": list(values.shape)}
-
-
-def _pack_numbers(results: Results, wanted: Callable[[str], bool]) -> dict[str, dict[str, Packed]]:
-    """Return by condition the numbers of the wanted names; seconds by their part alone."""
-    return {
-        condition: {
-            name.removeprefix(SECONDS): _constant(values) or values.tolist()
-            for name, values in numbers.items()
-        }
-        for condition in results.conditions
-        if (numbers := {n: v for n, v in results.numbers(condition).items() if wanted(n)})
-    }
-
-
-MOST_SEEDS = 100_000
-"""Largest number of seeds of a condition."""
-MOST_EPISODES = 1_000_000
-"""Largest number of episodes of a trial."""
-MOST_VERSION = 1_000_000
-"""Larger than any version of results will be."""
-MOST_VALUES = 20_000_000
-"""Values of a file that are written as one for all: some characters could fill any memory."""
-
-
-class Room:
-    """Number of values that compact arrays of a file may still expand to."""
-
-    def __init__(self) -> None:
-        self._left = MOST_VALUES
-
-    def take(self, shape: JsonValue, *most: int) -> tuple[int, ...]:
-        """Return the shape of an array, each side at most so long, and note what it takes."""
-        sides = shape.items()
-        if len(sides) != len(most):
-            raise shape.refusal(f"a list of {len(most)}")
-        lengths = tuple(side.whole(1, m) for side, m in zip(sides, most, strict=True))
-        self._left -= math.prod(lengths)
-        if self._left < 0:
-            raise shape.refusal(f"small: at most {MOST_VALUES} values of a file are one for all")
-        return lengths
-
-
-def _outline(spec: JsonValue, columns: Mapping[str, Mapping[str, object]]) -> StudyOutline:
-    """Return the outline of a spec, which is read where a page or a table names it."""
-    spec.child("study").text()
-    _seeds(spec.child("seeds"))
-    for name in ("episodes", "steps", "evaluation"):
-        spec.child(name).whole(0, MOST_EPISODES)
-    own = spec.table()
-    if "evaluation_steps" in own:
-        own["evaluation_steps"].whole(1, MOST_EPISODES)
-    overrides = own["overrides"].items() if "overrides" in own else []
-    for part in (spec, *overrides):
-        if "curriculum" in part.table():
-            for stage in part.child("curriculum").items():
-                stage.child("episodes").whole(0, MOST_EPISODES)
-    return StudyOutline.noted(spec.content, columns)
-
-
-def _seeds(value: JsonValue) -> tuple[int, ...]:
-    if not isinstance(value.content, list):
-        return tuple(range(value.whole(1, MOST_SEEDS)))
-    seeds = tuple(seed.whole(0, 2**63 - 1) for seed in value.items())
-    if not 1 <= len(seeds) <= MOST_SEEDS:
-        raise value.refusal(f"a list of 1 to {MOST_SEEDS} seeds")
-    if len(set(seeds)) < len(seeds):
-        raise value.refusal("a list of distinct seeds")
-    return seeds
-
-
-def _columns(value: JsonValue) -> dict[str, dict[str, str | float | bool | None]]:
-    """Return what tells the conditions apart, texts and numbers."""
-    columns = {name: row.table() for name, row in value.table().items()}
-    for row in columns.values():
-        for own in row.values():
-            if isinstance(own.content, int | float) and not isinstance(own.content, bool):
-                own.number()
-            elif own.content is not None and not isinstance(own.content, str | bool):
-                raise own.refusal("text, a number, true or false")
-    return {name: {key: own.content for key, own in row.items()} for name, row in columns.items()}
-
-
-def _measures(value: JsonValue) -> tuple[Measure, ...]:
-    measures = tuple(_measure(table) for table in value.items())
-    names = [measure.name for measure in measures]
-    if len({*names, "steps", "return"}) < len(names) + 2:
-        raise value.refusal("of distinct names, none of them steps or return")
-    return measures
-
-
-def _measure(value: JsonValue) -> Measure:
-    table = value.table()
-    known = {field.name for field in fields(Measure)}
-    for name, own in table.items():
-        if name not in known:
-            raise ValueError(f"{own.key}: known: {', '.join(sorted(known))}")
-    for name in ("name", "title", "unit", "source"):
-        if name in table or name in ("name", "title"):
-            value.child(name).text()
-    for name in ("least", "greatest"):
-        if name in table and table[name].content is not None:
-            table[name].number()
-    if "gathering" in table:
-        table["gathering"].text(GATHERINGS)
-    if "better" in table and table["better"].content is not None:
-        table["better"].text(("higher", "lower"))
-    if "is_rate" in table:
-        table["is_rate"].flag()
-    return Measure(**value.content)
-
-
-def _arrays(
-    by_condition: JsonValue,
-    seeds: Mapping[str, tuple[int, ...]],
-    measures: Collection[Measure],
-    room: Room,
-) -> dict[str, dict[str, Array]]:
-    """Return what was measured in a phase, by condition and name."""
-    rates = {measure.name for measure in measures if measure.is_rate}
-    names = {"steps", "return", *(measure.name for measure in measures)}
-    arrays: dict[str, dict[str, Array]] = {}
-    for condition, value in by_condition.table().items():
-        _check_condition(value, condition, seeds)
-        arrays[condition] = {}
-        for name, own in value.table().items():
-            if name not in names:
-                raise ValueError(f"{own.key}: no measure is called so")
-            unpack = _unpack_rates if name in rates else _unpack
-            array = unpack(own, room, len(seeds[condition]), MOST_EPISODES)
-            known = array[~np.isnan(array)]
-            if name == "steps" and not ((known == np.rint(known)) & (known >= 0)).all():
-                raise own.refusal("whole numbers, none below 0")
-            arrays[condition][name] = array
-        if len({np.isnan(array).tobytes() for array in arrays[condition].values()}) > 1:
-            raise ValueError(f"{value.key}: must have as many episodes of every measure")
-    return arrays
-
-
-def _numbers(
-    value: JsonValue,
-    seeds: Mapping[str, tuple[int, ...]],
-    parts: Collection[str],
-    room: Room,
-) -> dict[str, dict[str, Array]]:
-    """Return numbers of whole trials by condition and name; those of `parts` are seconds."""
-    numbers: dict[str, dict[str, Array]] = {}
-    for condition, named in value.table().items():
-        _check_condition(named, condition, seeds)
-        numbers[condition] = {
-            f"{SECONDS}{name}" if name in parts else name: _unpack(own, room, len(seeds[condition]))
-            for name, own in named.table().items()
-        }
-    return numbers
-
-
-def _check_condition(value: JsonValue, name: str, known: Collection[str]) -> None:
-    if name not in known:
-        raise ValueError(f"{value.key}: is no condition that has seeds")
-
-
-def _unpack(value: JsonValue, room: Room, n_seeds: int, *most: int) -> Array:
-    """Return numbers that `_pack` wrote, ``(n_seeds, ...)``."""
-    if isinstance(value.content, dict):
-        number = value.child("all").number()
-        array = np.full(room.take(value.child("shape"), n_seeds, *most), number)
-    elif most:
-        array = pad_rows([row.array(1) for row in value.items()] or [np.empty(0)])
-    else:
-        array = value.array(1)
-    return _check_rows(array, value, n_seeds)
-
-
-def _unpack_rates(value: JsonValue, room: Room, n_seeds: int, most: int) -> Array:
-    """Return zeros and ones that `_pack` wrote, ``(n_seeds, n_episodes)``."""
-    if isinstance(value.content, dict):
-        flags = _bits(value.child("flags"))
-        shape = room.take(value.child("shape"), n_seeds, most)
-        if len(flags) != math.prod(shape):
-            raise value.child("shape").refusal(f"that of {len(flags)} flags")
-        return _check_rows(flags.reshape(shape), value, n_seeds)
-    rows = [_bits(row) for row in value.items()] or [np.empty(0)]
-    return _check_rows(pad_rows(rows), value, n_seeds)
-
-
-def _bits(value: JsonValue) -> Array:
-    text = value.text()
-    if {*text} - {"0", "1"}:
-        raise value.refusal("text of 0 and 1")
-    return np.array(list(map(int, text)))
-
-
-def _check_rows(array: Array, value: JsonValue, n_seeds: int) -> Array:
-    if len(array) != n_seeds or array.size == 0:
-        raise value.refusal(f"of {n_seeds} seeds, a row for each")
-    return array

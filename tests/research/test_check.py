@@ -23,6 +23,12 @@ def test_every_published_condition_can_be_selected_as_a_spec(name):
         assert len(spec.get("overrides", [1])) == 1
 
 
+@pytest.mark.parametrize("name", [name for name in TABLES if "swimmer" not in name])  # MuJoCo
+def test_a_found_condition_can_be_run(name):
+    found = check.find_condition(name, 1e6)
+    assert found is None or len(Spec.read(dict(found.spec)).conditions()) == 1
+
+
 @pytest.mark.parametrize("name", ["ablation", "arms", "climbing", "learning-curve", "transfer"])
 def test_the_selected_spec_has_one_condition_with_the_seeds_that_fit(name):
     found = check.find_condition(name, 1e6)

@@ -236,4 +236,4 @@ def test_algorithms_that_share_no_step_are_refused(tmp_path: Path, capsys) -> No
     path = tmp_path / "runs.json"
     path.write_text(json.dumps({"env": {"task": {"A": {"s": SERIES}, "B": {"s": other}}}}))
     assert main(["compare", str(path)]) == 2
-    assert "return: most runs of every algorithm share no step_count" in capsys.readouterr().err
+    assert "return: most runs of every condition share no step_count" in capsys.readouterr().err

@@ -9,7 +9,7 @@ import pytest
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
-from nested_agents.studies.results.published import MOST_VALUES
+from nested_agents.studies.results.published import MAX_VALUES
 from nested_agents.studies.store.database import RESULTS_VERSION
 
 SPEC = {
@@ -70,7 +70,11 @@ INF = math.inf
 
 REFUSED = {
     "huge shape": (STEPS, {"all": 1, "shape": [3, 10**6 + 1]}, "steps.shape[1] = 1000001"),
-    "huge shape of seeds": (STEPS, {"all": 1, "shape": [10**5, 2]}, "steps.shape[0] = 100000"),
+    "huge shape of seeds": (
+        STEPS,
+        {"all": 1, "shape": [10**5, 2]},
+        "steps: has the shape (100000, 2)",
+    ),
     "endless shape": (STEPS, {"all": 1, "shape": [3, 10**400]}, "steps.shape[1] = 1.000e+400"),
     "negative shape": (STEPS, {"all": 1, "shape": [3, -1]}, "steps.shape[1] = -1"),
     "empty shape": (STEPS, {"all": 1, "shape": []}, "steps.shape = []"),
@@ -79,7 +83,11 @@ REFUSED = {
     "no shape": (STEPS, {"all": 1}, "steps.shape: is missing"),
     "text for all": (STEPS, {"all": "1", "shape": [3, 2]}, "steps.all = '1'"),
     "nan for all": (STEPS, {"all": NAN, "shape": [3, 2]}, "steps.all = nan"),
-    "flags of another shape": (SUCCESS, {"flags": "01", "shape": [3, 2]}, "success.shape = [3, 2]"),
+    "flags of another shape": (
+        SUCCESS,
+        {"flags": "01", "shape": [3, 2]},
+        "must have the shape of its 2 flags",
+    ),
     "flags of other signs": (SUCCESS, {"flags": "01x", "shape": [3, 1]}, "success.flags = '01x'"),
     "flags as a number": (SUCCESS, {"flags": 10, "shape": [1, 2]}, "success.flags = 10"),
     "digits that are no bits": (SUCCESS, ["01", "00", "02"], "success[2] = '02'"),
@@ -89,13 +97,17 @@ REFUSED = {
         ["01", "00", "0"],
         "must have as many episodes of every measure",
     ),
-    "numbers for bits": (SUCCESS, [[0, 1], [0, 0], [0, 0]], "success[0] = [0, 1]"),
+    "numbers for bits": (
+        SUCCESS,
+        [[0, 1], [0, 0], [0, 0]],
+        "default.success: must be text of 0 and 1",
+    ),
     "text for numbers": (STEPS, [["a", "b"]] * 3, "steps[0][0] = 'a'"),
     "digits in quotes": (STEPS, [[30, 30], [30, "30"], [30, 30]], "steps[1][1] = '30'"),
     "truth for numbers": (STEPS, [[30, True], [1, 1], [1, 1]], "steps[0][1] = true"),
     "nothing for numbers": (STEPS, [[30, None], [1, 1], [1, 1]], "steps[0][1] = None"),
-    "parts of steps": (f"{STEPS}/1/0", 6.5, "steps = [[30, 6], [6.5, 30], [30, 30]]"),
-    "negative steps": (f"{STEPS}/1/0", -6, "steps = [[30, 6], [-6, 30], [30, 30]]"),
+    "parts of steps": (f"{STEPS}/1/0", 6.5, "default.steps: must be whole numbers"),
+    "negative steps": (f"{STEPS}/1/0", -6, "default.steps: must be whole numbers"),
     "nan": (f"{STEPS}/1/0", NAN, "steps[1][0] = nan"),
     "infinity": (f"{STEPS}/1/0", INF, "steps[1][0] = inf"),
     "less than all": (f"{STEPS}/1/0", -INF, "steps[1][0] = -inf"),
@@ -104,10 +116,10 @@ REFUSED = {
     "rows differ": (f"{STEPS}/1", [30], "must have as many episodes of every measure"),
     "row is none": (f"{STEPS}/1", 30, "steps[1] = 30"),
     "rows too deep": (STEPS, [[[1]], [[1]], [[1]]], "steps[0][0] = [1]"),
-    "no rows": (STEPS, [], "steps = []"),
-    "a row too few": (STEPS, [[1, 2], [3, 4]], "steps = [[1, 2], [3, 4]]: must be of 3 seeds"),
+    "no rows": (STEPS, [], "steps: has the shape (0,)"),
+    "a row too few": (STEPS, [[1, 2], [3, 4]], "steps: has the shape (2, 2), must be of 3 seeds"),
     "episodes too few": (STEPS, [[1], [2], [3]], "training.default: must have as many episodes"),
-    "unknown measure": ("phases/training/default/height", [[1]], "default.height: no measure"),
+    "unknown measure": ("phases/training/default/height", [[1]] * 3, "default.height: no measure"),
     "unknown condition": ("phases/training/other", ARRAYS, "training.other: is no condition"),
     "duplicate seeds": ("seeds/default", [61, 61, 61], "seeds.default = [61, 61, 61]"),
     "huge seeds": ("seeds/default", 10**9, "seeds.default = 1000000000"),
@@ -133,13 +145,17 @@ REFUSED = {
     "measure by number": ("measures/1/title", 3, "measures[1].title = 3"),
     "measure twice": ("measures/1/name", "success", "measures = "),
     "measure called steps": ("measures/1/name", "steps", "measures = "),
-    "measure of more": ("measures/1/more", 1, "measures[1].more: known: better, "),
+    "measure of more": ("measures/1/more", 1, "measures[1].more: is no known key"),
     "gathering": ("measures/1/gathering", "median", "measures[1].gathering = 'median'"),
     "better": ("measures/1/better", "blue", "measures[1].better = 'blue'"),
     "rate": ("measures/1/is_rate", "no", "measures[1].is_rate = 'no'"),
     "bound": ("measures/1/least", NAN, "measures[1].least = nan"),
     "number of a trial": ("numbers/default/agents", [2, 2, "2"], "default.agents[2] = '2'"),
-    "numbers too few": ("numbers/default/agents", [2], "default.agents = [2]: must be of 3 seeds"),
+    "numbers too few": (
+        "numbers/default/agents",
+        [2],
+        "default.agents: has the shape (1,), must be of 3 seeds",
+    ),
     "numbers of others": ("numbers/other", {"agents": [2]}, "numbers.other: is no condition"),
     "usage": ("usage/default/total", [1, 2, INF], "usage.default.total[2] = inf"),
     "version as text": ("results_version", "4", "results_version = '4'"),
@@ -187,7 +203,7 @@ def test_a_key_that_stands_twice_is_named(tmp_path, capsys) -> None:
 def test_many_small_texts_fill_no_memory(tmp_path) -> None:
     """A hundred arrays that are each allowed, of 400 MB in all, in 12 kB."""
     file = tmp_path / "results.json"
-    full = {"all": 1, "shape": [3, MOST_VALUES // 30]}
+    full = {"all": 1, "shape": [3, MAX_VALUES // 30]}
     table = json.loads(json.dumps(SOUND))
     table["phases"] = {f"phase {i}": {"default": {"steps": full}} for i in range(100)}
     file.write_text(json.dumps(table))

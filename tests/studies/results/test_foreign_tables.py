@@ -9,16 +9,18 @@ import pytest
 import nested_agents as na
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.results.foreign import Foreign, ScoreColumns, results_of
-from nested_agents.studies.results.score_files import table_of
+from nested_agents.studies.results.foreign_tables import ScoreColumns, read_scores
+from nested_agents.studies.results.score_tables import table_of
+from nested_agents.studies.results.scores import ScoreResults
 
 TOPOLOGIES = {"chain": 0.2, "ring": 0.8, "star": 0.5}
 NAMES = ScoreColumns(("topology",), ("right",), "run", "question")
 ROLES = {"condition": "topology", "seed": "run", "item": "question"}
 
 
-def read(frame: pd.DataFrame, columns: ScoreColumns = NAMES) -> Foreign:
-    return results_of(table_of(frame), columns)
+def read(frame: pd.DataFrame, columns: ScoreColumns = NAMES) -> ScoreResults:
+    table = table_of(frame)
+    return read_scores(table, ScoreColumns.of(columns._asdict(), table.columns))
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +140,7 @@ def test_scores_may_have_names_that_mean_something_in_studies(scores, name) -> N
         ({"topology": b"chain"}, NAMES, r"row 0: topology = .*: must be text or a number"),
         ({"question": None}, NAMES, r"row 0: question is blank"),
         ({"question": "q1"}, NAMES, r"row 1: .*question = 'q1': stands in row 0, too"),
-        ({"run": None}, NAMES, r"row 0: run is blank, but other rows of condition 'chain'"),
+        ({"run": None}, NAMES, r"row 0: run is blank, but other rows of its condition"),
         ({"run": "1"}, NAMES, r"run = 1: must be text everywhere or a number everywhere"),
     ],
 )
