@@ -350,10 +350,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             reward = self.mirror.reward(reward)
             left = self.mirror.states(left)
             taken = np.tile(taken, 2)
-        # Only the leader's learner needs to know durations.
-        lasting = {"duration": experience.duration} if experience.duration > 1 else {}
-        ended = transition.terminated
-        self.count(self.learner.observe_decision(left, taken, states, reward, ended, **lasting))
+        updates = self.learner.observe_decision(
+            left, taken, states, reward, transition.terminated, experience.duration
+        )
+        self.count(updates)
         if experience.last:
             self.end_episode()
 

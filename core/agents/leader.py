@@ -15,7 +15,7 @@ from ..hierarchy.stages import Inbox
 from ..interface.agents import AgentContext
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.options import LeaderOptions
-from ..interface.scenario import Scenario, Transition
+from ..interface.scenario import Scenario, Transition, prediction_of
 from ..learners.fitted_q import FittedQSettings
 from ..numerics import FloatArray, IntArray
 from .fuzzy import FuzzyAgents
@@ -49,10 +49,12 @@ class Leader:
 
     Parameters
     ----------
-    options
-        Options of the scenario in which the leader is built.
+    scenario, options
+        Scenario in which the leader is built, and its options.
     seed
         Seed of the leader's random numbers.
+    needs_prediction
+        Whether the agents below decide or learn by predictions.
 
     Attributes
     ----------
@@ -60,15 +62,28 @@ class Leader:
         The agent that decides and learns; empty for a leader by rule.
     """
 
-    def __init__(self, options: LeaderOptions, seed: np.random.SeedSequence) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        options: LeaderOptions,
+        seed: np.random.SeedSequence,
+        *,
+        needs_prediction: bool,
+    ) -> None:
         self.agents: tuple[FuzzyAgents, ...] = ()
-        self._view = LeaderView(options)
+        self._needs_prediction = needs_prediction
         if options.learner is not None:
             assert isinstance(options.learner, FittedQSettings)
-            hierarchy = Hierarchy(self._view.agents, [])
-            context = AgentContext(self._view, hierarchy, np.arange(1), seed)
+            view = LeaderView(options)
+            context = AgentContext(view, Hierarchy(view.agents, []), np.arange(1), seed)
             self.agents = (FuzzyAgents(options.learner, context),)
+        self.enter(scenario, options)
         self.reset()
+
+    def enter(self, scenario: Scenario, options: LeaderOptions) -> None:
+        """Lead the agents of a scenario, which may be another one in every episode."""
+        self._scenario = scenario
+        self._options = options
 
     def reset(self) -> None:
         """Start an episode."""
@@ -77,7 +92,7 @@ class Leader:
         self._return = 0.0
 
     def lead(
-        self, options: LeaderOptions, observation: Observation, *, explore: bool
+        self, observation: Observation, *, explore: bool
     ) -> tuple[Observation, IntArray | None]:
         """Decide on an option if none goes on.
 
@@ -88,20 +103,23 @@ class Leader:
         IntArray or None
             Their actions ``(n,)``, if a given skill acts for them.
         """
+        options = self._options
         goes_on = 0 < self._duration < options.limit and options.advance()
         if not goes_on:
-            states = options.begin(self._decide(options, explore=explore))
+            states = options.begin(self._decide(explore=explore))
             observation = observation._replace(states=states)
+            if self._needs_prediction:  # an option that begins changes what is predicted
+                observation = observation._replace(prediction=prediction_of(self._scenario))
             self._duration = 0
         self._duration += 1
         return observation, options.joint_action()
 
-    def _decide(self, options: LeaderOptions, *, explore: bool) -> int:
+    def _decide(self, *, explore: bool) -> int:
         """Return an option; a leader that learns has first learned from the last one."""
         if not self.agents:
-            return options.rule()
+            return self._options.rule()
         (agent,) = self.agents
-        observation = Observation(options.observe()[None])
+        observation = Observation(self._options.observe()[None])
         if self._decided is not None and explore:
             self._learn(observation.states, terminated=False, last=False)
         inputs = agent.observe(observation, explore=explore)
@@ -110,7 +128,7 @@ class Leader:
         self._decided = observation, action, inputs
         return int(action[0])
 
-    def learn(self, options: LeaderOptions, experience: Experience) -> None:
+    def learn(self, experience: Experience) -> None:
         """Add the mean reward of a step below, and learn if the episode ends with it.
 
         A lost task is terminal to the leader. A terminal reward repeats forever if the state does.
@@ -125,7 +143,7 @@ class Leader:
         self._return += discount ** (self._duration - 1) * reward
         if experience.last:
             is_terminal = transition.terminated or transition.truncated
-            self._learn(options.observe()[None], terminated=is_terminal, last=True)
+            self._learn(self._options.observe()[None], terminated=is_terminal, last=True)
 
     def _learn(self, states: FloatArray, *, terminated: bool, last: bool) -> None:
         """Learn from an option that has ended in some states ``(1, d)`` of the leader."""

@@ -22,6 +22,7 @@ from ..interface.agents import (
     Inspectable,
     ObservesJointActions,
     Rearrangeable,
+    RecordsValues,
     ReportsCosts,
     ReportsResources,
     SendsPayloads,
@@ -138,14 +139,15 @@ class Team:
         )
         self._present = hierarchy
         self._actions_of_left = _actions_of_left(failures, checked)
-        self.leader = None
-        self._scenario: Scenario = checked
-        self._options = options_of(checked)
-        if self._options is not None:
+        self.leader: Leader | None = None
+        options = options_of(checked)
+        if options is not None:
             if failures or settings.n_environments > 1:
                 key = "topology.failures" if failures else "learner.environments"
                 raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
-            self.leader = Leader(self._options, seed.spawn(1)[0])
+            needs_prediction = self.needs_prediction
+            own_seed = seed.spawn(1)[0]
+            self.leader = Leader(checked, options, own_seed, needs_prediction=needs_prediction)
         self._all = self.parts if self.leader is None else (*self.parts, *self.leader.agents)
 
     @cached_property
@@ -236,12 +238,13 @@ class Team:
             team has one; one line.
         """
         if previous is None:  # an episode begins
-            self._options = options_of(scenario)
-            if (self.leader is None) != (self._options is None):
+            options = options_of(scenario)
+            if (self.leader is None) != (options is None):
                 raise ValueError(
                     "scenario.leader: build the team in a scenario with the same leader"
                 )
-            self._scenario = scenario
+            if self.leader is not None and options is not None:
+                self.leader.enter(scenario, options)
         prediction = prediction_of(scenario) if self.needs_prediction else UNPREDICTED
         return Observation(states, prediction, previous)
 
@@ -291,12 +294,8 @@ class Team:
             self._rearrange()
         if inspect and observation.states.ndim > 2:
             raise ValueError("inspect = True: a decision of one environment only")
-        if self._options is not None and self.leader is not None:
-            led, skilled = self.leader.lead(self._options, observation, explore=explore)
-            if led is not observation:  # an option that begins changes what is predicted
-                if self.needs_prediction:
-                    led = led._replace(prediction=prediction_of(self._scenario))
-                observation = led
+        if self.leader is not None:
+            observation, skilled = self.leader.lead(observation, explore=explore)
             if skilled is not None:
                 self.decision_costs = {measure.name: 0.0 for measure in self.costs}
                 return Decision(skilled, ())
@@ -306,7 +305,7 @@ class Team:
         if inspect:
             inboxes = []
             for part, own in zip(self.parts, inputs, strict=True):
-                if isinstance(part, Inspectable):
+                if isinstance(part, RecordsValues):
                     part.record_values(own)
         joint_action = self._decide(observation, inputs, inboxes)
         payloads = self._payloads(inputs) if self._senders else NO_PAYLOADS
@@ -416,8 +415,8 @@ class Team:
 
     def learn(self, experience: Experience) -> None:
         """Learn from a step. Below a leader, only the leader learns."""
-        if self._options is not None and self.leader is not None:
-            self.leader.learn(self._options, experience)
+        if self.leader is not None:
+            self.leader.learn(experience)
             return
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)

@@ -9,14 +9,11 @@ of the drivers on all other variables is regressed on the rules of a fuzzy rule 
 Angles always use changes.
 
 Bodies of one kind share weights: one set for the effect on itself, one for the effect on others.
-Both are ridge regressions (Hoerl and Kennard 1970) on sums over all experience, so that memory and
-time do not grow. Predictions stay within the observed range. Over several decisions, the first
-joint action is held.
+Both are ridge regressions on sums over all experience. Predictions stay within the observed range.
+Over several decisions, the first joint action is held.
 """
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -25,12 +22,11 @@ from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
-from .adaptive import Adaptive, DynamicsModel
+from .adaptive import DynamicsModel
 from .learned_prediction import LearnedPrediction
 from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states
+from .regression import INTERVAL, RegressionModel, solve_ridge
 
-INTERVAL = 100
-"""Number of decisions between regressions within an episode."""
 MAX_FEATURES = 4096
 """Maximum number of features of a regression that is solved densely."""
 OWN_RIDGE = 1e-6
@@ -41,7 +37,7 @@ GRAIN = 1e-3
 """Own variables are rounded to this share of their range, so that equal outcomes are found."""
 
 
-class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
+class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
     """Learns the outcome of actions by regression; see the module.
 
     Parameters
@@ -110,7 +106,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         r = self.own_rules.n_rules if self.own_rules else 0
         of_own = (self.kinds.max() + 1, self.n_actions, r)
         f = k * rules
-        self.memory: dict[str, FloatArray] = {
+        self.memory = {
             "own_gram": np.zeros((*of_own, r)),
             "own_moment": np.zeros((*of_own, space.n_own)),
             "own_weights": np.zeros((*of_own, space.n_own)),
@@ -121,7 +117,6 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
             "keep": np.ones(v),
             "seen": np.where(self.periods > 0.0, [low, high], [[np.inf], [-np.inf]]),
         }
-        """Sums over all experience, and the weights computed from them."""
 
     def predict(self, states: FloatArray) -> LearnedPrediction:
         """Predict from states ``(n, d)``."""
@@ -224,11 +219,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
 
     def _ridge(self, gram: FloatArray, moment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the weights of a ridge regression, and the sum of squares that they explain."""
-        from scipy.linalg import cho_factor, cho_solve
-
         ridge = self.settings.ridge
-        regular = gram + ridge * np.eye(len(gram))
-        weights = cho_solve(cho_factor(regular, overwrite_a=True, check_finite=False), moment)
+        weights = solve_ridge(gram, moment, ridge)
         return weights, (weights * moment).sum(axis=0) + ridge * (weights**2).sum(axis=0)
 
     def group_drivers(self, own: FloatArray, joint_actions: IntArray) -> FloatArray:
@@ -279,14 +271,6 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         )
         body, place = bodies.places
         return np.ascontiguousarray(np.moveaxis(moved[:, body, place], 0, 1))
-
-    def state_dict(self) -> dict[str, FloatArray]:
-        """Return sums over all experience, and the weights computed from them."""
-        return self.memory
-
-    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
-        """Continue from a `state_dict`."""
-        self.memory = {name: np.array(state[name]) for name in self.memory}
 
     def warm_start(self, former: LearnedPredictor) -> None:
         """Start from another predictor if its bodies have the same variables."""

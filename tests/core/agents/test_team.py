@@ -472,7 +472,7 @@ class Sarsa(Learner):
     def begin_episode(self):
         self.before = None
 
-    def observe_decision(self, left, joint_action, states, reward, terminated):
+    def observe_decision(self, left, joint_action, states, reward, terminated, duration):
         self.met.append((left, joint_action, states))
         features, every = self.rules.features(left), np.arange(len(left))
         weights = self.theta.reshape(len(left), 3, -1)
