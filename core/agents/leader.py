@@ -12,11 +12,13 @@ import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox
+from ..interface.abilities import options_of
 from ..interface.agents import AgentContext
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.options import LeaderOptions
 from ..interface.scenario import Scenario, Transition, prediction_of
 from ..learners.fitted_q import FittedQSettings
+from ..learners.learner import TeamSettings
 from ..numerics import FloatArray, IntArray
 from .fuzzy import FuzzyAgents
 from .views import FuzzyInputs
@@ -153,3 +155,42 @@ class Leader:
         decision = Decision(action, (inputs,))
         self.agents[0].learn(Experience(before, decision, result, last, self._duration), inputs)
         self._return = 0.0
+
+
+def build_leader(
+    settings: TeamSettings,
+    scenario: Scenario,
+    seed: np.random.SeedSequence,
+    *,
+    messages_fail: bool,
+) -> Leader | None:
+    """Return the leader of a team with some settings, or None if the scenario has no options.
+
+    Raises
+    ------
+    ValueError
+        If messages fail or there are several environments; one line.
+    """
+    options = options_of(scenario)
+    if options is None:
+        return None
+    if messages_fail or settings.n_environments > 1:
+        key = "topology.failures" if messages_fail else "learner.environments"
+        raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
+    (own_seed,) = seed.spawn(1)
+    return Leader(scenario, options, own_seed, needs_prediction=settings.needs_prediction)
+
+
+def enter_scenario(leader: Leader | None, scenario: Scenario) -> None:
+    """Let the leader of a team, if there is one, lead in a scenario.
+
+    Raises
+    ------
+    ValueError
+        If only one of the team and the scenario has a leader; one line.
+    """
+    options = options_of(scenario)
+    if (leader is None) != (options is None):
+        raise ValueError("scenario.leader: build the team in a scenario with the same leader")
+    if leader is not None and options is not None:
+        leader.enter(scenario, options)
