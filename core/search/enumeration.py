@@ -61,7 +61,7 @@ def exact_joint_actions(problem: DecisionProblem) -> int:
     return sum(problem.n_actions ** (1 + k) for k in below)
 
 
-class _Outcomes:
+class _JointOutcomes:
     """Predicted outcomes of all joint actions. Equivalent actions are predicted once.
 
     Parameters
@@ -93,12 +93,15 @@ class _Outcomes:
         self.values: tuple[Learned, FloatArray] | None = None
         alike = prediction.alike
         if alike is not None:
-            numbers = (alike == np.arange(alike.shape[1])).cumsum(axis=1) - 1
-            counts = numbers[:, -1] + 1
             rows = np.zeros(1, dtype=np.int64)
-            for first, number, count in zip(alike, numbers, counts, strict=True):
+            n_rows = 1
+            for group, equivalent in zip(problem.groups, alike, strict=True):
+                first = equivalent[: problem.n_actions ** len(group)]
+                number = (first == self.rows[: len(first)]).cumsum() - 1
+                count = number[-1] + 1
                 rows = np.add.outer(rows * count, number[first]).ravel()
-            firsts = np.empty(counts.prod(), dtype=np.int64)
+                n_rows *= count
+            firsts = np.empty(n_rows, dtype=np.int64)
             firsts[rows[::-1]] = self.rows[::-1]
             self.rows = rows
             self.distinct = joint_actions[firsts]
@@ -147,7 +150,7 @@ class ExactEnumeration(Aggregation):
         """By agent, contributions of its own and lower actions to the joint-action index."""
         self._strides: list[IntArray] = []
         """By agent, index strides ``(n,)`` of the actions of all others, else 0."""
-        self._last: _Outcomes | None = None
+        self._last: _JointOutcomes | None = None
         if a**n <= min(self.hierarchy.count_joint_actions(a), MAX_JOINT_ACTIONS):
             self._every = combinations(tuple(range(n)), a)
             strides = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
@@ -175,7 +178,7 @@ class ExactEnumeration(Aggregation):
         if self._every is None:
             return super().worths(context, tried)
         if self._last is None or self._last.prediction is not context.prediction:
-            self._last = _Outcomes(self.problem, context.prediction, self._every)
+            self._last = _JointOutcomes(self.problem, context.prediction, self._every)
         outcomes = self._last
         agent = context.agent
         given = int(context.joint_action @ self._strides[agent])
@@ -188,7 +191,7 @@ class ExactEnumeration(Aggregation):
         return worth.reshape(self.n_actions, -1)
 
     def _values_of(
-        self, context: DecisionContext, outcomes: _Outcomes, rows: IntArray
+        self, context: DecisionContext, outcomes: _JointOutcomes, rows: IntArray
     ) -> FloatArray:
         """Return the values ``(k,)`` of rows ``(k,)`` of the outcomes to the deciding agent.
 

@@ -95,19 +95,19 @@ def _wrong_equivalents(
     if alike is None:
         return
     n_actions = len(scenario.action_set)
-    sizes = {len(group) for group in scenario.groups}
-    shape = len(scenario.groups), n_actions ** max(sizes)
-    if len(sizes) > 1 or np.shape(alike) != shape:
-        yield f"alike of shape {np.shape(alike)}, must be {shape}, for groups of one size"
+    shape = len(scenario.groups), n_actions ** max(map(len, scenario.groups))
+    if np.shape(alike) != shape:
+        yield f"alike of shape {np.shape(alike)}, must be {shape}"
         return
-    number = np.arange(shape[1])
-    if (alike < 0).any() or (alike > number).any() or (alike[:, 0] != 0).any():
-        yield "alike must hold the first equivalent robot-action index of each index"
-        return
-    digits = (n_actions,) * max(sizes)
     replaced = joint_actions.copy()
-    for group, first in zip(scenario.groups, alike, strict=True):
+    for group, row in zip(scenario.groups, alike, strict=True):
         members = list(group)
+        digits = (n_actions,) * len(members)
+        first = row[: n_actions ** len(members)]
+        in_order = (first >= 0) & (first <= np.arange(len(first)))
+        if not (in_order.all() and (first[first] == first).all()):
+            yield "alike must hold the first equivalent robot-action index of each index"
+            return
         actions = np.ravel_multi_index(tuple(joint_actions[:, members].T), digits)
         replaced[:, members] = np.stack(np.unravel_index(first[actions], digits), axis=-1)
     for agent, expected in enumerate(states):
