@@ -98,7 +98,7 @@ class _JointOutcomes:
             for group, equivalent in zip(problem.groups, alike, strict=True):
                 first = equivalent[: problem.n_actions ** len(group)]
                 number = (first == self.rows[: len(first)]).cumsum() - 1
-                count = number[-1] + 1
+                count = int(number[-1]) + 1
                 rows = np.add.outer(rows * count, number[first]).ravel()
                 n_rows *= count
             firsts = np.empty(n_rows, dtype=np.int64)

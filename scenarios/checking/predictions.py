@@ -100,10 +100,10 @@ def _wrong_equivalents(
         yield f"alike of shape {np.shape(alike)}, must be {shape}"
         return
     replaced = joint_actions.copy()
-    for group, row in zip(scenario.groups, alike, strict=True):
+    for group, equivalent in zip(scenario.groups, alike, strict=True):
         members = list(group)
         digits = (n_actions,) * len(members)
-        first = row[: n_actions ** len(members)]
+        first = equivalent[: n_actions ** len(members)]
         in_order = (first >= 0) & (first <= np.arange(len(first)))
         if not (in_order.all() and (first[first] == first).all()):
             yield "alike must hold the first equivalent robot-action index of each index"
