@@ -251,7 +251,7 @@ class BatchTD(Learner):
         self._follower = [state["follower"].astype(np.int64)]
         self._durations = [state["durations"].astype(np.int64)]
         self._n_states = len(state["states"])
-        self._episode_start = 1 + max(np.flatnonzero(self._follower[0] < 0), default=-1)
+        self._episode_start = 1 + int(np.append(-1, np.flatnonzero(self._follower[0] < 0)).max())
         self._active = []
         self._n_regressed = 0
         self._summed = {}
@@ -261,8 +261,9 @@ class BatchTD(Learner):
         state = former.state_dict()
         renamed = np.empty_like(rows)
         renamed[rows] = np.arange(len(rows))
-        own = {"theta": former.theta[rows], "rows": renamed[state["rows"].astype(np.int64)]}
-        BatchTD.load_state_dict(self, {**state, **own})
+        BatchTD.load_state_dict(self, state)
+        self.theta = former.theta[rows]
+        self._rows = [renamed[self._rows[0]]]
 
 
 @njit(cache=True)
