@@ -10,10 +10,9 @@ from .studies.cli.display import (
     print_wrapped,
 )
 from .studies.cli.main import run_to_status
-from .studies.presentation.tables import Cell, tabulate, write_csv
+from .studies.presentation.tables import tabulate, write_csv
 
 __all__ = [
-    "Cell",
     "closest",
     "in_form",
     "print_data",

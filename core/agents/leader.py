@@ -8,6 +8,9 @@ process. If the option lasts k decisions with rewards r_1 to r_k, the leader lea
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
@@ -26,6 +29,16 @@ from .views import FuzzyInputs
 NO_MESSAGES = np.zeros(0, np.int64)
 INBOX = Inbox(np.zeros(1, np.int64), NO_MESSAGES, NO_MESSAGES, NO_MESSAGES)
 """A leader has no superior that sends it messages."""
+
+
+@contextmanager
+def keys_below(table: str) -> Iterator[None]:
+    """Name the keys of a learner by the table that its table lies in, when they are refused."""
+    try:
+        yield
+    except ValueError as error:
+        where = table if str(error).startswith("learner.") else ""
+        raise ValueError(f"{where}{error}") from None
 
 
 class LeaderView(Scenario):
@@ -78,7 +91,8 @@ class Leader:
             assert isinstance(options.learner, FittedQSettings)
             view = LeaderView(options)
             context = AgentContext(view, Hierarchy(view.agents, []), np.arange(1), seed)
-            self.agents = (FuzzyAgents(options.learner, context),)
+            with keys_below("scenario.leader."):
+                self.agents = (FuzzyAgents(options.learner, context),)
         self.enter(scenario, options)
         self.reset()
 

@@ -13,8 +13,7 @@ import jinja2
 
 import nested_agents as na
 from nested_agents import Summary
-from nested_agents.analysis import format_number
-from nested_agents.terminal import Cell
+from nested_agents.analysis import format_estimate, format_number
 from research import claims, load, push_n
 from research.studies.chain_order import order_tests
 
@@ -29,21 +28,17 @@ def rows(name: str) -> na.StudyResults:
 
 def cell(name: str, condition: str, column: str) -> str:
     """Return an estimate with its 95% interval, as the table of its study has it."""
-    return _of_table(name, condition, column).text()
+    return format_estimate(_lines(name)[condition].estimates[column])
 
 
 def value(name: str, condition: str, column: str) -> str:
     """Return an estimate without its interval."""
-    return _of_table(name, condition, column).value
+    return cell(name, condition, column).partition(" ")[0]
 
 
 def seeds(name: str, condition: str) -> int:
     """Return the number of seeds of a condition."""
     return _lines(name)[condition].seeds
-
-
-def _of_table(name: str, condition: str, column: str) -> Cell:
-    return Cell.of(_lines(name)[condition].estimates[column])
 
 
 @cache
@@ -62,7 +57,7 @@ def entries() -> dict[str, Summary]:
 def entry(name: str, robots: int) -> str:
     """Return the success of an entry of push-n with so many robots; a dash if it has not run."""
     estimate = entries()[name].estimates.get(f"{robots} robots")
-    return "--" if estimate is None else Cell.of(estimate).text()
+    return "--" if estimate is None else format_estimate(estimate)
 
 
 def orders() -> dict[str, str]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.aggregates import Aggregates, aggregate
 from ..results.comparison import ComparisonTable
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Report):
     """Conditions compared by one measure; printed or shown by a notebook, table and verdicts."""
 
     analysis: ComparisonTable
@@ -39,8 +39,13 @@ class Comparison:
         return self.analysis.differences
 
     @property
-    def verdicts(self) -> tuple[str, ...]:
-        """Results and their power, line by line."""
+    def tables(self) -> tuple[SummaryTable]:
+        """The table of estimates."""
+        return (self.table,)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Verdicts, their power and remarks, line by line."""
         return (*self.analysis.notes, *self.remarks)
 
     @cached_property
@@ -84,7 +89,7 @@ class Comparison:
 
         file = Path(path)
         check_path(file)
-        notes = [*self.verdicts]
+        notes = [*self.notes]
         figures: dict[str, Figure] = {}
         if any(len(runs) > 1 for group in self.analysis.groups for runs in group.values.values()):
             notes += ["", str(self.aggregated), "", *self.statistics.notes]
@@ -92,12 +97,3 @@ class Comparison:
         title = self.analysis.title
         durable.write(file, comparison_page(title, sources, notes, self.table, figures).encode())
         return file
-
-    def __str__(self) -> str:
-        return "\n".join([str(self.table), "", *self.verdicts])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        lines = "\n".join(map(escape, self.verdicts))
-        return f"{self.table.html}<pre>{lines}</pre>"

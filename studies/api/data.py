@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from html import escape
 from itertools import chain
 from os import PathLike
@@ -67,7 +67,9 @@ class StudyData:
     """Condition, seed and traceback of every failed trial."""
     remarks: tuple[str, ...] = ()
     """Remarks on the results, line by line."""
-    _sources: Sources = field(default_factory=Sources, repr=False)
+    _sources: Sources = field(
+        default_factory=partial(Sources, brought_by="these results"), repr=False
+    )
     _settings: Mapping[str, TomlTable] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()
     _tables: Mapping[str, SpecTable] = field(default_factory=dict, repr=False)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from numbers import Integral
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from ...core.plugins.words import expect, expect_each
 from ..cost.profile import search_method
 from ..laws import scaling
 from ..laws.size_axis import SizeAxis, columns_of
+from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.results import Results
 from ..trials.arrangement import arrange
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Growth:
+@dataclass(frozen=True, repr=False)
+class Growth(Report):
     """Growth of a measure with size; printed, it is a table with sentences."""
 
     analysis: scaling.ScalingLaw
@@ -36,6 +36,11 @@ class Growth:
         return tabulate(self.analysis.table)
 
     @property
+    def tables(self) -> tuple[SummaryTable]:
+        """The table of laws."""
+        return (self.table,)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Chosen laws, their predictions of sizes that were left out, differences of exponents."""
         return self.analysis.notes
@@ -45,15 +50,6 @@ class Growth:
         from ..presentation.growth import draw_laws  # matplotlib takes its time
 
         return draw_laws(self.analysis)
-
-    def __str__(self) -> str:
-        return "\n".join([str(self.table), "", *self.notes])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        lines = "\n".join(map(escape, self.notes))
-        return f"{self.table.html}<pre>{lines}</pre>"
 
 
 def scaling_law(

@@ -184,9 +184,13 @@ def _open(path: Path) -> Opened:
         if isinstance(error, SpecError):
             raise
         raise SpecError(f"{path}: holds no published results: {error}") from None
-    remarks = (f"{path}: {kept.note}",) if kept.note else ()
-    sources = Sources(path.parent, brought_by=str(path))
-    return StudyResults(kept.outline, kept.results, (), remarks, sources)
+    remarks = tuple(f"{path}: {note}" for note in kept.notes)
+    return StudyResults(kept.outline, kept.results, (), remarks, _sources_beside(path))
+
+
+def _sources_beside(path: Path | None) -> Sources:
+    """Return the files that somebody else's file of results may name: those of its folder."""
+    return Sources(path and path.parent, brought_by=str(path or "a table"))
 
 
 def _results_of(
@@ -210,25 +214,31 @@ def _results_of(
 
 def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better) -> StudyResults:
     """Return the results of a table of scores, or of an exported one; messages name its file."""
+    header = Header.beside(path) if path else None
+    is_listed = header is not None and path is not None and path.name in header.files
     with refused(f"{path}: " if path else ""):
-        if is_exported(table) and roles.keys() <= {"score"}:
+        if is_exported(table, is_listed=is_listed) and roles.keys() <= {"score"}:
             _check_better(better)
-            header = Header.beside(path) if path else None
             measure = next(iter(map(str, roles.values())), None)
             return _of_scores(read_export(table, header), path, header, measure)
         columns = ScoreColumns.of(roles, table.columns)
-        return _of_scores(read_scores(table, columns, better), path)
+        read = read_scores(table, columns, better)
+    notes = header.remarks(path) if header and path and is_listed else ()
+    return _of_scores(read._replace(notes=(*notes, *read.notes)), path)
 
 
 def _of_runs(runs: Runs, path: Path, better: Better) -> StudyResults:
     """Return the results of runs of the form of marl-eval."""
     header = Header.beside(path)
+    notes: tuple[str, ...] = ()
     if header is not None and not is_exported_by(runs, header):
+        notes = header.remarks(path) if path.name in header.files else ()
         header = None
     with refused(f"{path}: "):
         if header is not None:
             _check_better(better)
-        return _of_scores(results_of_runs(runs, better, header), path, header)
+        read = results_of_runs(runs, better, header)
+    return _of_scores(read._replace(notes=(*notes, *read.notes)), path, header)
 
 
 def _check_better(better: Better) -> None:
@@ -255,7 +265,10 @@ def _of_scores(
         results = header.limited(results)
         notes = (*header.remarks(path), *notes)
     remarks = tuple(f"{path}: {line}" if path else line for line in notes)
-    return StudyResults(outline, results, (), remarks, _defaults=Defaults(measure, read.by))
+    sources = _sources_beside(path)
+    return StudyResults(
+        outline, results, (), remarks, sources, _defaults=Defaults(measure, read.by)
+    )
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:

@@ -24,6 +24,7 @@ from ...scenarios.faults.wrappers import (
     FaultyParallelEnv,
     Mechanism,
 )
+from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
 from ..results.recovery import BLOCK, REGAINED, recovery
@@ -136,8 +137,8 @@ class FaultCourse(NamedTuple):
         return Summary(self.name, len(self.faulty), estimates)
 
 
-@dataclass(frozen=True)
-class RecoveryTable:
+@dataclass(frozen=True, repr=False)
+class RecoveryTable(Report):
     """Cost of faults by policy; printed or shown by a notebook."""
 
     courses: tuple[FaultCourse, ...]
@@ -148,14 +149,15 @@ class RecoveryTable:
         """The table in all its forms."""
         return tabulate([course.summary() for course in self.courses])
 
-    def __str__(self) -> str:
-        legend = f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes."
-        return f"{self.table}\n{legend}"
+    @property
+    def tables(self) -> tuple[SummaryTable]:
+        """The table of policies and schedules."""
+        return (self.table,)
 
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return self.table.html
+    @property
+    def notes(self) -> tuple[str]:
+        """Meaning of the columns."""
+        return (f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes.",)
 
 
 def recovery_table(

@@ -57,7 +57,7 @@ def print_lines(lines: Iterable[str]) -> None:
 
 def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> None:
     """Print estimates by condition, each over its 95% interval, and its legend or another one."""
-    if table.rows:
+    if table.lines:
         print_text(table.text(get_terminal_size().columns), "")
     print_lines(table.legend if legend is None else legend)
 

@@ -33,6 +33,7 @@ from ...core.numerics import BoolArray, optimize, special
 from ..results.statistics import Array, Estimate
 from .curves import POWER, Curve
 from .drift import Drift, Mixture, drift
+from .inference import mean_interval
 from .samples import LOGIT, Sample, check_sizes
 
 RESAMPLES = 400
@@ -300,11 +301,9 @@ def compare(law: Law, base: Law) -> Contrast:
         for own in (law, base)
     ]
     each = slopes[0] - slopes[1]
-    seeds = len(each)
-    value = float(each.mean())
+    difference = mean_interval(each)
     deviation = float(each.std(ddof=1))
-    error = deviation / math.sqrt(seeds)
-    half = float(special.stdtrit(seeds - 1, 0.975)) * error
-    ends = map(np.asarray, (value, value - half, value + half))
-    p = float(2.0 * special.stdtr(seeds - 1, -abs(value) / error)) if error > FLAT else 1.0
-    return Contrast(Estimate(*ends), p if error > FLAT or not value else 0.0, deviation)
+    error = deviation / math.sqrt(len(each))
+    t = abs(float(difference.value)) / error if error > FLAT else math.inf
+    p = 1.0 if not difference.value else float(2.0 * special.stdtr(len(each) - 1, -t))
+    return Contrast(difference, p, deviation)

@@ -12,7 +12,7 @@ from functools import cached_property
 from html import escape as in_html
 from shutil import get_terminal_size
 from textwrap import wrap
-from typing import Any, Literal, NamedTuple, TextIO
+from typing import Any, Literal, TextIO
 
 import numpy as np
 
@@ -22,9 +22,9 @@ from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
 from ..errors import WIDTH, SpecError
 from ..results.analysis import Summary
-from ..results.notation import format_estimate
+from ..results.notation import format_estimate, wrapped
 from ..results.spreadsheet import harmless
-from ..results.statistics import FEW, Estimate, exactly, stack_estimates
+from ..results.statistics import FEW, exactly, plain, stack_estimates
 from .legend import meanings
 from .progress import count
 
@@ -38,8 +38,18 @@ MISSING = "–"
 def text_of(frame: pd.DataFrame, width: int = WIDTH, *, index: bool = True) -> str:
     """Return a table of texts; columns beyond the width follow below, as a further table.
 
-    Headings that are wider than their column have two lines.
+    Headings that are wider than their column have two lines. No column stands alone below others.
     """
+    text = _in_lines(frame, width, index=index)
+    without_last = _in_lines(frame.iloc[:, :-1], width, index=index)
+    if len(frame.columns) < 3 or text.count("\n\n") == without_last.count("\n\n"):
+        return text
+    parts = frame.iloc[:, :-2], frame.iloc[:, -2:]
+    return "\n\n".join(text_of(part, width, index=index) for part in parts)
+
+
+def _in_lines(frame: pd.DataFrame, width: int, *, index: bool) -> str:
+    """Return a table of texts in lines of a width."""
     clean = frame.rename(index=lambda label: printable(str(label)))
     headings = [
         _in_two_lines(printable(title), max(map(len, frame[title]), default=0)) for title in frame
@@ -177,66 +187,65 @@ class SummaryTable:
     lines: tuple[Summary, ...]
     """Lines of the table. It prints as on a terminal of 80 columns; notebooks show HTML."""
 
+    remark: str = ""
+    """Remark on the intervals; by default how those of rates and other means are computed."""
+
     def __str__(self) -> str:
-        return "\n".join([self.text(), "", *self.legend] if self.rows else self.legend)
+        return "\n".join([self.text(), "", *self.legend] if self.lines else self.legend)
+
+    @cached_property
+    def cells(self) -> pd.DataFrame:
+        """Estimates with intervals as text, empty where there is none, a row for each line."""
+        estimates = [[line.estimates.get(title) for title in self.titles] for line in self.lines]
+        rows = [[format_estimate(e) if e else "" for e in row] for row in estimates]
+        return pd.DataFrame(rows, columns=list(self.titles), dtype=object)
 
     def text(self, width: int = WIDTH) -> str:
         """Return a line of estimates for each condition, each with its 95% interval.
 
         The number of seeds stands after the label if conditions differ in it.
         """
+        if not self.lines:
+            return ""
         labels = [
-            condition if self.seeds else f"{condition} ({count(seeds, 'seed')})"
-            for condition, seeds, _ in self.rows
+            line.condition if self.seeds else f"{line.condition} ({count(line.seeds, 'seed')})"
+            for line in self.lines
         ]
-        columns = {
-            title: _aligned([cells[i] for *_, cells in self.rows])
-            for i, title in enumerate(self.titles)
-        }
-        return text_of(pd.DataFrame(columns, index=labels), width) if self.rows else ""
+        return text_of(self.cells.apply(_aligned).set_axis(labels), width)
 
     @property
     def seeds(self) -> int:
         """Number of seeds of all lines; 0 if they differ."""
-        (least, *more) = {seeds for _, seeds, _ in self.rows} or {0}
+        (least, *more) = {line.seeds for line in self.lines} or {0}
         return 0 if more else least
 
     @property
     def legend(self) -> list[str]:
         """Lines that explain the cells."""
-        if not self.rows:
+        if not self.lines:
             return ["no trial has finished"]
         if self.seeds == 1:
             return ["Values of 1 seed, without intervals."]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
-        lines = [f"Means over {over} with 95% intervals.", self.remark]
-        columns = zip(*(cells for *_, cells in self.rows), strict=True)
-        known = ({not cell.interval for cell in column if cell is not None} for column in columns)
-        if any(len(kinds) > 1 for kinds in known):
+        lines = [
+            f"Means over {over} with 95% intervals.",
+            *wrapped(self.remark or self._usual_remark),
+        ]
+        has_interval = self.cells.map(lambda text: " " in text).where(self.cells != "")
+        if (has_interval.nunique() > 1).any():
             lines.append("Without an interval: one seed has the value, or all seeds have the same.")
         return lines
+
+    @property
+    def _usual_remark(self) -> str:
+        if all(line.seeds >= FEW for line in self.lines):
+            return "Rates have Wilson intervals, others bootstrap intervals (too short if skewed)."
+        return f"Fewer than {FEW} seeds: rates have Wilson intervals, others Student intervals."
 
     @property
     def meanings(self) -> dict[str, str]:
         """Explanations of the columns by heading, as far as they are known."""
         return meanings(self.titles)
-
-    @property
-    def remark(self) -> str:
-        """Remark on the intervals."""
-        if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return "Rates have Wilson intervals, others bootstrap intervals (too short if skewed)."
-        return f"Fewer than {FEW} seeds: rates have Wilson intervals, others Student intervals."
-
-    @cached_property
-    def rows(self) -> tuple[Row, ...]:
-        """Lines as text."""
-        rows = []
-        for line in self.lines:
-            estimates = (line.estimates.get(title) for title in self.titles)
-            cells = tuple(None if e is None else Cell.of(e) for e in estimates)
-            rows.append((line.condition, line.seeds, cells))
-        return tuple(rows)
 
     @property
     def csv(self) -> str:
@@ -257,50 +266,47 @@ class SummaryTable:
         """
         rows = []
         for line in self.lines:
-            estimates = {
-                title: dict(zip(Estimate._fields, estimate.to_json(), strict=True))
-                for title, estimate in line.estimates.items()
-                if title in self.titles
-            }
-            row = {"condition": line.condition, "seeds": line.seeds, "estimates": estimates}
-            rows.append(json.dumps(row))
+            known = {t: e for t, e in line.estimates.items() if t in self.titles}
+            rows.append(json.dumps(plain(line._replace(estimates=known)._asdict())))
         return "[" + ",\n ".join(rows) + "]\n"
 
     @property
     def markdown(self) -> str:
         """The whole table in Markdown."""
         titles = [*map(_in_markdown, ["condition", "seeds", *self.titles])]
-        lines = [titles, ["---"] * len(titles)]
-        for condition, seeds, cells in self.rows:
-            texts = [c.text() if c else "" for c in cells]
-            lines.append([_in_markdown(condition), str(seeds), *texts])
-        return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+        rows = [titles, ["---"] * len(titles)]
+        for line, cells in zip(self.lines, rows_of(self.cells), strict=True):
+            rows.append([_in_markdown(line.condition), str(line.seeds), *map(str, cells)])
+        return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
     @property
     def html(self) -> str:
         """The table as HTML."""
-        cells = [[c.text() if c else "" for c in row] for *_, row in self.rows]
-        index = [f"{condition}, {count(seeds, 'seed')}" for condition, seeds, _ in self.rows]
-        table = pd.DataFrame(cells, index, self.titles).to_html(border=0)
+        index = [f"{line.condition}, {count(line.seeds, 'seed')}" for line in self.lines]
+        table = self.cells.set_axis(index).to_html(border=0)
         return f"{table}<p><small>{in_html(' '.join(self.legend))}</small></p>"
 
     @property
     def latex(self) -> str:
         """The whole table in LaTeX."""
-        rows = [
-            (name, seeds, *(f"${c.text(MATHS_SPACE)}$" if c else "--" for c in cells))
-            for name, seeds, cells in self.rows
-        ]
-        frame = pd.DataFrame(rows, columns=["condition", "seeds", *self.titles])
+        cells = self.cells.map(
+            lambda text: f"${text.replace(' ', MATHS_SPACE, 1)}$" if text else "--"
+        )
+        cells.insert(0, "condition", [line.condition for line in self.lines])
+        cells.insert(1, "seeds", [line.seeds for line in self.lines])
         note = "; 95% intervals in brackets"
-        return in_latex(frame, "condition", f"lr{'r' * len(self.titles)}", note)
+        return in_latex(cells, "condition", f"lr{'r' * len(self.titles)}", note)
 
     def _repr_html_(self) -> str:
         return self.html
 
 
-def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:
+def tabulate(
+    lines: Sequence[Summary], columns: Sequence[str] = (), remark: str = ""
+) -> SummaryTable:
     """Return the table of summaries, which may have different estimates.
+
+    It has copies of the estimates: changing them changes no result.
 
     Parameters
     ----------
@@ -308,6 +314,8 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
         Its lines.
     columns
         Titles of the estimates that it has, with or without units; all if none are named.
+    remark
+        Remark on the intervals, if they are not those of rates and means.
 
     Raises
     ------
@@ -325,7 +333,8 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
             has = f"it has {', '.join(map(repr, titles)) or 'none'}"
             hint = f"{near(column, titles)} {has}".lstrip()
             raise SpecError(f"columns: the table has no {column!r}; {hint}")
-    return SummaryTable(tuple(columns) or titles, tuple(lines))
+    own = tuple(line._replace(estimates=dict(line.estimates)) for line in lines)
+    return SummaryTable(tuple(columns) or titles, own, remark)
 
 
 def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> str:
@@ -372,31 +381,9 @@ def _in_one_line(text: str) -> str:
     return " ".join(printable(text).split())
 
 
-class Cell(NamedTuple):
-    """An estimate as text."""
-
-    value: str
-    interval: str
-    """In brackets; nothing if it is not known."""
-
-    @classmethod
-    def of(cls, estimate: Estimate) -> Cell:
-        """Return the cell of an estimate."""
-        value, _, interval = format_estimate(estimate).partition(" ")
-        return cls(value, interval)
-
-    def text(self, space: str = " ") -> str:
-        """Return the value and, if it is known, its interval."""
-        return f"{self.value}{space}{self.interval}" if self.interval else self.value
-
-
-Row = tuple[str, int, tuple[Cell | None, ...]]
-"""Condition, number of seeds, and a cell per title; none where there is no estimate."""
-
-
-def _aligned(cells: Sequence[Cell | None]) -> list[str]:
+def _aligned(cells: Sequence[str]) -> list[str]:
     """Return cells in which values end, and intervals begin, at one place."""
-    known = [cell or Cell("", "") for cell in cells]
-    value = max(len(cell.value) for cell in known)
-    interval = max(len(cell.interval) for cell in known)
-    return [f"{cell.value:>{value}} {cell.interval:<{interval}}" for cell in known]
+    parts = [cell.partition(" ") for cell in cells]
+    value = max(len(value) for value, *_ in parts)
+    interval = max(len(interval) for *_, interval in parts)
+    return [f"{v:>{value}} {i:<{interval}}" for v, _, i in parts]

@@ -144,7 +144,7 @@ def hierarchy_pictures(store: Store) -> list[Picture]:
     with suppress(SpecError):
         spec = spec_of(store)
         with spec.sources.active():
-            for view in hierarchies_of(spec)[:MAX_HIERARCHIES]:
+            for view in hierarchies_of(spec, MAX_HIERARCHIES):
                 if len(view.hierarchy) <= MAX_AGENTS:
                     drawings[view.title] = picture(
                         view.hierarchy, bodies=view.bodies, failing=view.failing

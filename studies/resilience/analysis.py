@@ -12,9 +12,14 @@ import numpy as np
 
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
-from ..results.analysis import Summary, verdicts
-from ..results.comparison import mean_estimate
-from ..results.differences import Difference, Pair, differences, paired_difference
+from ..results.analysis import Summary, mean_estimate, verdicts
+from ..results.differences import (
+    Difference,
+    Pair,
+    difference_of_estimates,
+    differences,
+    paired_difference,
+)
 from ..results.notation import format_estimate, format_number
 from ..results.permutation_tests import LEVEL
 from ..results.results import row_means
@@ -154,7 +159,9 @@ class Resilience:
         return tuple(
             d
             if not d.paired or np.ptp(d.sample) > 0.0
-            else replace(d, estimate=_combined(changes[first.condition], changes[d.condition]))
+            else replace(
+                d, estimate=difference_of_estimates(changes[first.condition], changes[d.condition])
+            )
             for d in compared
         )
 
@@ -250,25 +257,25 @@ class Resilience:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """Return everything as plain data, which JSON can hold."""
+        """Return everything as tables and lists, see `plain`."""
         return {
             "fault": self.fault,
             "measure": self.measure.name,
             "tolerance": self.tolerance,
             "teams": [self._team_to_dict(own) for own in self.teams],
-            "left_out": list(self.left_out),
+            "left_out": self.left_out,
             "comparison": [
                 {
                     "condition": d.condition,
                     "reference": self.teams[0].condition,
                     "seeds": d.seeds,
                     "paired": d.paired,
-                    "difference_in_loss": d.estimate.to_json(),
+                    "difference_in_loss": d.estimate,
                     "p": d.p,
                 }
                 for d in self.comparison
             ],
-            "sentences": list(self.sentences),
+            "sentences": self.sentences,
         }
 
     def _team_to_dict(self, own: TeamLosses) -> dict[str, object]:
@@ -276,14 +283,14 @@ class Resilience:
         return {
             "condition": own.condition,
             "seeds": len(own.intact),
-            "intact": mean_estimate(self.measure, own.intact).to_json(),
+            "intact": mean_estimate(self.measure, own.intact),
             "tolerates_any_single_loss": self.verdict(own),
             "halving": own.halving,
             "single": [
                 {
                     "lost": d.condition,
                     "position": positions[d.condition],
-                    "change": d.estimate.to_json(),
+                    "change": d.estimate,
                     "p": d.p,
                 }
                 for d in self.single[own.condition]
@@ -296,17 +303,7 @@ class Resilience:
                 for units, values in own.lost.items()
             ],
             "numbers": [
-                {"n_lost": n, "sets": len(sets)}
-                | {"change": self._change(own, own.joined(sets)).to_json()}
+                {"n_lost": n, "sets": len(sets), "change": self._change(own, own.joined(sets))}
                 for n, sets in own.by_number.items()
             ],
         }
-
-
-def _combined(first: Estimate, second: Estimate) -> Estimate:
-    """Return the first estimate minus the second one as if they were independent."""
-    value = first.value - second.value
-    low = value - np.hypot(first.value - first.low, second.high - second.value)
-    return Estimate(
-        value, low, value + np.hypot(first.high - first.value, second.value - second.low)
-    )

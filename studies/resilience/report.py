@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING
 
+from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.notation import wrapped
+from ..results.statistics import plain
 from .analysis import Resilience
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class ResilienceReport:
+@dataclass(frozen=True, repr=False)
+class ResilienceReport(Report):
     """Costs of lost agents in trained teams; printed or shown by a notebook."""
 
     analysis: Resilience
@@ -25,6 +26,11 @@ class ResilienceReport:
     def table(self) -> SummaryTable:
         """Performance and its change by condition, position and number of losses."""
         return tabulate(self.analysis.summaries)
+
+    @property
+    def tables(self) -> tuple[SummaryTable]:
+        """The table of losses."""
+        return (self.table,)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -37,19 +43,10 @@ class ResilienceReport:
     @property
     def json(self) -> str:
         """Everything as JSON."""
-        return json.dumps(self.analysis.to_dict(), indent=1)
+        return json.dumps(plain(self.analysis.to_dict()), indent=1)
 
     def figures(self) -> dict[str, Figure]:
         """Return the hierarchy of each condition with agents colored by what their loss costs."""
         from .figure import draw  # matplotlib takes its time
 
         return draw(self.analysis)
-
-    def __str__(self) -> str:
-        return "\n".join([str(self.table), "", *self.notes])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        notes = "\n".join(map(escape, self.notes))
-        return f"{self.table.html}<p>{notes}</p>"

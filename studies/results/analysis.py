@@ -57,18 +57,19 @@ def estimate_of(
     results: Results, condition: str, phase: str, measure: Measure, part: slice = slice(None)
 ) -> Estimate:
     """Return the mean of a measure over episodes, or a slice of them, with its interval."""
+    shown = results.steps(phase) if measure.name == STEPS.name else measure
     values = results.values(condition, measure.name, phase, part)
-    if measure.is_rate and not np.isnan(values).any():
-        return rate(values)
-    means = row_means(pd.DataFrame(values)).to_numpy()
+    return mean_estimate(shown, pd.DataFrame(values))
+
+
+def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
+    """Return the mean over seeds of values with a row for each seed."""
+    if measure.is_rate and values.notna().all(axis=None):
+        return rate(values.to_numpy(dtype=float))
+    means = row_means(values).to_numpy()
     if measure.name == STEPS.name:
-        return steps_estimate(means, results.steps(phase))
+        return steps_estimate(means, measure)
     return bootstrap(means, bounds=measure.bounds)
-
-
-def estimate_over_seeds(values: Array, measure: Measure) -> Estimate:
-    """Return the mean of values ``(n_seeds,)`` of whole trials with its interval."""
-    return rate(values[:, None]) if measure.is_rate else bootstrap(values, bounds=measure.bounds)
 
 
 def steps_estimate(means: Array, steps: Measure) -> Estimate:

@@ -13,14 +13,14 @@ from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import aliases, label, named
-from .analysis import NOTHING, Summary, identity_lines, steps_estimate, verdicts
+from .analysis import NOTHING, Summary, identity_lines, mean_estimate, verdicts
 from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
 from .notation import wrapped
 from .power_text import power_lines
 from .recovery import RECOVERY, recovery_by_seed
 from .results import SECONDS, STEPS, Results, describe_number, row_means
 from .scores import LAST_STEP
-from .statistics import Array, Estimate, bootstrap, exactly, rate
+from .statistics import Array, Estimate, exactly
 
 DIFFERENCE_TITLES = {True: "difference", False: "difference (independent samples)"}
 """Headings of the column of differences, of paired and of independent runs."""
@@ -275,16 +275,6 @@ def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
     total = len(index) + len(other)
     count = total - 2 * len(index.intersection(other))
     return f"{count} of {total} {unit}" if count else ""
-
-
-def mean_estimate(measure: Measure, values: pd.DataFrame) -> Estimate:
-    """Return the mean over seeds of values with a row for each seed."""
-    means = row_means(values).to_numpy()
-    if measure.name == STEPS.name:
-        return steps_estimate(means, measure)
-    if measure.is_rate and values.notna().all(axis=None):
-        return rate(values.to_numpy(dtype=float))
-    return bootstrap(means, bounds=measure.bounds)
 
 
 def values_of(

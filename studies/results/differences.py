@@ -29,22 +29,26 @@ class Difference:
 
     condition: str
     measure: str
-    seeds: int
-    """Number of seeds that both have, or the size of the smaller independent sample."""
     estimate: Estimate
     """Mean difference with its 95% interval."""
     raw: float
     """Unadjusted p of no difference, by permutation."""
     p: float
     """p adjusted by Holm's method over all differences that were compared together."""
-    sample: Array = field(repr=False, compare=False)
-    """Differences of single seeds ``(n_seeds,)``; empty for independent samples."""
+    values: tuple[Array, Array] = field(repr=False, compare=False)
+    """Compared values of the condition and of the reference, ``(n_seeds,)`` each."""
     paired: bool = True
     """Whether runs of equal seed were compared; otherwise the samples are independent."""
-    values: tuple[Array, Array] = field(
-        default=(np.empty(0), np.empty(0)), repr=False, compare=False
-    )
-    """Compared values of the condition and of the reference."""
+
+    @property
+    def seeds(self) -> int:
+        """Number of seeds that both have, or the size of the smaller independent sample."""
+        return min(map(len, self.values))
+
+    @property
+    def sample(self) -> Array:
+        """Differences of single seeds ``(n_seeds,)``; empty for independent samples."""
+        return np.subtract(*self.values) if self.paired else np.empty(0)
 
     @property
     def shown(self) -> str:
@@ -120,26 +124,17 @@ def compare_pair(
         The difference with unadjusted p; None if there are too few runs.
     """
     one, other = select_shared([own, base])
-    if len(one) >= MIN_RUNS:
+    paired = len(one) >= MIN_RUNS
+    if paired:
         estimate = paired_difference(one, other, measure)
         p = paired_permutation(one, other)
-        return Difference(
-            condition, title, len(one), estimate, p, p, one - other, values=(one, other)
-        )
-    if min(len(own), len(base)) < MIN_RUNS:
+    elif min(len(own), len(base)) < MIN_RUNS:
         return None
-    one, other = (np.sort(np.asarray(values, float)) for values in (own, base))
-    return Difference(
-        condition=condition,
-        measure=title,
-        seeds=min(len(one), len(other)),
-        estimate=independent_difference(one, other, measure),
-        raw=independent_permutation(one, other),
-        p=1.0,
-        sample=np.empty(0),
-        paired=False,
-        values=(one, other),
-    )
+    else:
+        one, other = (np.sort(np.asarray(values, float)) for values in (own, base))
+        estimate = independent_difference(one, other, measure)
+        p = independent_permutation(one, other)
+    return Difference(condition, title, estimate, p, p, (one, other), paired)
 
 
 def _adjusted(compared: Sequence[Difference]) -> list[Difference]:
@@ -163,9 +158,7 @@ def adjust(
     computed = []
     for condition, measure, own, base, estimate in compared:
         p = paired_permutation(own, base)
-        computed.append(
-            Difference(condition, measure, len(own), estimate, p, p, own - base, values=(own, base))
-        )
+        computed.append(Difference(condition, measure, estimate, p, p, (own, base)))
     return tuple(_adjusted(computed))
 
 
@@ -220,11 +213,15 @@ def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Esti
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '1.00 [0.54, 1.00]'
     """
-    a = rate(first, level)
-    b = rate(second, level)
-    value = a.value - b.value
-    low = value - np.hypot(a.value - a.low, b.high - b.value)
-    return Estimate(value, low, value + np.hypot(a.high - a.value, b.value - b.low))
+    return difference_of_estimates(rate(first, level), rate(second, level))
+
+
+def difference_of_estimates(first: Estimate, second: Estimate) -> Estimate:
+    """Return the first estimate minus the second, with intervals combined as independent ones."""
+    value = first.value - second.value
+    low = value - np.hypot(first.value - first.low, second.high - second.value)
+    high = value + np.hypot(first.high - first.value, second.value - second.low)
+    return Estimate(value, low, high)
 
 
 def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> Estimate:

@@ -42,10 +42,14 @@ class Description(NamedTuple):
     notes: Sequence[str] = ()
 
 
-def is_exported(table: ScoreTable) -> bool:
-    """Tell whether a table is one that a study exports."""
+def is_exported(table: ScoreTable, *, is_listed: bool = False) -> bool:
+    """Return whether a table has the columns of an exported study.
+
+    Tables of scores may have them, too, unless the file that describes a study lists the table.
+    """
     names = {*table.columns}
-    return "score" not in names and ({*EPISODES} <= names or {*TRIALS} <= names)
+    is_other = "score" in names and not is_listed
+    return not is_other and ({*EPISODES} <= names or {*TRIALS} <= names)
 
 
 def read_export(table: ScoreTable, header: Header | None) -> ScoreResults:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, TypeAlias
 
 from pydantic import PlainValidator, ValidationError
@@ -16,7 +17,13 @@ Json: TypeAlias = "dict[str, Json] | list[Json] | str | float | bool | None"
 """Content of a JSON file."""
 MAX_WHOLE = 2**53
 """Largest whole number up to which a float holds every whole number."""
-KEY_PROBLEMS = {"missing": "is missing", "unexpected_keyword_argument": "is no known key"}
+CHECKSUM = "sha256"
+"""Key of a file's own checksum."""
+KEY_PROBLEMS = {
+    "missing": "is missing",
+    "unexpected_keyword_argument": "is no known key",
+    "extra_forbidden": "is no known key",
+}
 """Problems of a key, whatever its value, by the type of pydantic's error."""
 
 
@@ -36,6 +43,22 @@ def read_json(text: str, number: Callable[[str], Json] | None = None) -> Json:
         parse_constant=number,
     )
     return content
+
+
+def checksum(table: Mapping[str, object]) -> str:
+    """Return the SHA-256 of the content of a JSON file, without its own checksum.
+
+    White space and the notation of numbers do not change it.
+    """
+    content = {key: value for key, value in table.items() if key != CHECKSUM}
+    return hashlib.sha256(json.dumps(content, separators=(",", ":")).encode()).hexdigest()
+
+
+def in_lines(table: Mapping[str, object]) -> str:
+    """Return a JSON text with a line for each key, and with its checksum."""
+    whole = {**table, CHECKSUM: checksum(table)}
+    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in whole.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def _distinct(pairs: list[tuple[str, Json]]) -> dict[str, Json]:

@@ -8,7 +8,6 @@ committed files give the table that the run gave.
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -20,8 +19,10 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     BeforeValidator,
+    ConfigDict,
     Discriminator,
     Field,
+    PrivateAttr,
     Tag,
     ValidationError,
     WrapValidator,
@@ -34,11 +35,12 @@ from ..spec.outline import StudyOutline
 from ..store.database import RESULTS_VERSION, tables
 from ..store.database import SECONDS as PARTS
 from ..store.durable import read_text
-from .json_files import Finite, explain, read_json
+from .json_files import Finite, checksum, explain, in_lines, read_json
 from .results import SECONDS, Array, Results, StepLimits, from_arrays, pad_rows
 
 HEADER = "study.json"
 """Name of the file that describes the study of exported tables."""
+CHANGED = "has been changed since it was exported"
 FEW = 100
 """Fewer rows, or values, are always written one by one."""
 MAX_SEEDS = 100_000
@@ -156,14 +158,18 @@ def _keep(table: object, validate: Callable[[object], SpecKeys]) -> object:
 class Header(BaseModel):
     """Description of a study: what its files say besides numbers."""
 
+    model_config = ConfigDict(extra="forbid")
     results_version: Annotated[int, Field(ge=1, le=MAX_VERSION)]
     spec: Annotated[SpecKeys, WrapValidator(_keep)]
     """The whole spec as a table."""
     columns: dict[str, dict[str, str | bool | Finite | None]]
     """Swept keys by condition, in the order of the study."""
     measures: Annotated[tuple[Measure, ...], AfterValidator(_check_measures)]
-    sha256: dict[str, str] = {}
-    """SHA-256 by name of the tables that were exported with it, as CSV."""
+    files: dict[str, str] = {}
+    """SHA-256 of the exported files in its folder, by name."""
+    sha256: str | None = None
+    """Checksum of its own file."""
+    _is_changed: bool = PrivateAttr(default=False)
 
     @classmethod
     def of(cls, text: str) -> Self:
@@ -176,9 +182,12 @@ class Header(BaseModel):
         """
         file = read_json(text)
         try:
-            return cls.model_validate_json(text, strict=True)
+            header = cls.model_validate_json(text, strict=True)
         except ValidationError as error:
             raise ValueError(explain(error, file)) from None
+        if isinstance(file, dict):
+            header._is_changed = header.sha256 not in (None, checksum(file))
+        return header
 
     @classmethod
     def beside(cls, path: Path) -> Self | None:
@@ -195,9 +204,8 @@ class Header(BaseModel):
         try:
             text = read_text(place)
             file = read_json(text)
-            return (
-                None if isinstance(file, dict) and "results_version" not in file else cls.of(text)
-            )
+            is_own = isinstance(file, dict) and not {"results_version", "files"}.isdisjoint(file)
+            return cls.of(text) if is_own else None
         except (OSError, ValueError, RecursionError) as error:
             raise SpecError(f"{place}: describes no exported study: {error}") from None
 
@@ -207,18 +215,20 @@ class Header(BaseModel):
         return StudyOutline.noted(dict(self.spec), self.columns)
 
     @property
-    def note(self) -> str | None:
-        """Note on results of another version than this; None for those of this version."""
-        if self.results_version == RESULTS_VERSION:
-            return None
-        return f"results of version {self.results_version}, this is version {RESULTS_VERSION}"
+    def notes(self) -> tuple[str, ...]:
+        """Notes on results of another version than this, and on a changed file."""
+        other = f"results of version {self.results_version}, this is version {RESULTS_VERSION}"
+        is_other = self.results_version != RESULTS_VERSION
+        return (*[other] * is_other, *[CHANGED] * self._is_changed)
 
     def remarks(self, path: Path) -> tuple[str, ...]:
-        """Return the note, and that an exported table has been changed."""
-        known = self.sha256.get(path.name)
+        """Return the notes, and whether an exported file has been changed."""
+        notes = tuple(f"{HEADER} {note}" if note == CHANGED else note for note in self.notes)
+        known = self.files.get(path.name)
+        if known is None and self.files:
+            return (*notes, f"is not among the files that {HEADER} lists")
         is_changed = known not in (None, hashlib.sha256(path.read_bytes()).hexdigest())
-        changed = f"has been changed since it was exported, says {HEADER}"
-        return (*filter(None, [self.note]), *[changed] * is_changed)
+        return (*notes, *[f"{CHANGED}, says {HEADER}"] * is_changed)
 
     def limited(self, results: Results) -> Results:
         """Return results with the limits of the spec."""
@@ -264,8 +274,7 @@ def dumps(outline: StudyOutline, results: Results) -> str:
         "numbers": _pack_numbers(results, lambda name: name not in results.usage),
         "usage": _pack_numbers(results, lambda name: name in results.usage),
     }
-    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+    return in_lines(content)
 
 
 def header(outline: StudyOutline, results: Results) -> dict[str, object]:
@@ -320,7 +329,7 @@ class Published(NamedTuple):
     outline: StudyOutline
     results: Results
     version: int
-    note: str | None
+    notes: tuple[str, ...]
 
 
 def loads(text: str) -> Published:
@@ -349,7 +358,7 @@ def loads(text: str) -> Published:
         for condition, named in _arrays(file.usage, "usage", file.seeds).items()
     }
     results = from_arrays(phases, file.seeds, numbers, usage, file.columns, file.measures)
-    return Published(file.outline, file.limited(results), file.results_version, file.note)
+    return Published(file.outline, file.limited(results), file.results_version, file.notes)
 
 
 def _arrays(

@@ -7,7 +7,7 @@ with runs as clusters. A single seed has no interval.
 
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from numbers import Real
 from typing import NamedTuple
@@ -45,15 +45,30 @@ class Estimate(NamedTuple):
     low: Array
     high: Array
 
-    def to_json(self) -> list[float | None]:
-        """Return the three scalars for JSON, which has no infinity and no NaN: these are None."""
-        return [float(end) if np.isfinite(end) else None for end in self]
-
 
 def exactly(value: ArrayLike) -> Estimate:
     """Return values without an interval, such as counts."""
     unknown = np.full(np.shape(value), np.nan)
     return Estimate(np.asarray(value), unknown, unknown)
+
+
+def plain(value: object) -> object:
+    """Return tables and lists of estimates and numbers as JSON has them.
+
+    An estimate is a table of ``value``, ``low`` and ``high``; what is infinite or unknown is None.
+
+    Examples
+    --------
+    >>> plain({"a": [Estimate(1.0, -np.inf, 2.0)], "b": (3, "c")})
+    {'a': [{'value': 1.0, 'low': None, 'high': 2.0}], 'b': [3, 'c']}
+    """
+    if isinstance(value, Estimate):
+        value = {name: float(end) for name, end in zip(Estimate._fields, value, strict=True)}
+    if isinstance(value, Mapping):
+        return {key: plain(own) for key, own in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(own) for own in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _numbers(values: ArrayLike, name: str) -> Array:

@@ -258,39 +258,27 @@ class Scalability:
                 )
 
     def to_dict(self) -> dict[str, object]:
-        """Return everything as plain data, which JSON can hold; infinite bounds are None."""
+        """Return everything as tables and lists, see `plain`."""
         return {
             "size": self.data.size,
             "scaling": self.data.scaling,
             "performance": self.data.performance_title,
-            "rows": [
-                {
-                    "condition": line.condition,
-                    "seeds": line.seeds,
-                    "estimates": {title: e.to_json() for title, e in line.estimates.items()},
-                }
-                for line in self.summaries
-            ],
-            "laws": {name: self._law_to_dict(name) for name in self.laws},
+            "rows": [line._asdict() for line in self.summaries],
+            "laws": {name: self._law_to_dict(name, law) for name, law in self.laws.items()},
             "best_sizes": {name: own._asdict() for name, own in self.best_sizes.items()},
-            "crossovers": [
-                {"better": c.better, "worse": c.worse, "size": c.size.to_json()}
-                for c in self.crossovers
-            ],
+            "crossovers": [crossover._asdict() for crossover in self.crossovers],
             "fronts": [point._asdict() for point in self.fronts],
             "budget": [choice._asdict() for choice in self.choices],
             "paragraph": self.paragraph,
         }
 
-    def _law_to_dict(self, hierarchy: str) -> dict[str, object]:
-        law = self.laws[hierarchy]
+    def _law_to_dict(self, hierarchy: str, law: UniversalLaw) -> dict[str, object]:
         largest = self.data.sizes(hierarchy)[-1]
-        best = law.best_size_within(largest)
         return {
-            "contention": law.contention.to_json(),
-            "coherency": law.coherency.to_json(),
+            "contention": law.contention,
+            "coherency": law.coherency,
             "describes_times": law.is_plausible,
-            "best_size": None if best is None else best.to_json(),
+            "best_size": law.best_size_within(largest),
             "sentence": _place(law, largest, self.data.size),
         }
 

@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..laws.scaling import decisions_to_criterion
 from ..laws.size_axis import SizeAxis, columns_of
 from ..laws.universal import Scaling, Times
-from ..results.analysis import estimate_of, estimate_over_seeds
+from ..results.analysis import estimate_of, mean_estimate
 from ..results.comparison import title_of, values_of
 from ..results.results import Results
 from ..results.statistics import Array, Estimate
@@ -94,6 +94,20 @@ class ScalabilityData:
         """Return the hierarchies that were measured at a size."""
         return tuple(name for name in self.hierarchies if (name, size) in self.performances)
 
+    def paired_at(
+        self, size: float, measured: Sequence[Cells]
+    ) -> tuple[tuple[str, ...], list[Array]]:
+        """Return the hierarchies at a size with all of some values, and their values.
+
+        Performance and the other values ``(n_seeds, n_hierarchies)`` are those of the seeds that
+        all share.
+        """
+        groups = [self.performances, *measured]
+        here = self.at_size(size)
+        names = tuple(name for name in here if all((name, size) in cells for cells in measured))
+        columns = [cells[name, size] for cells in groups for name in names]
+        return names, np.split(paired(columns), len(groups), axis=1)
+
     def times_of(self, hierarchy: str) -> Times | None:
         """Return the times of the seeds that ran at all sizes; None if fewer than two did."""
         sizes = self.sizes(hierarchy)
@@ -163,7 +177,7 @@ def collect(
         performance_estimates={
             places[condition]: estimate_of(results, condition, phase, shown_as)
             if phase
-            else estimate_over_seeds(pd.Series(own).to_numpy(float), shown_as)
+            else mean_estimate(shown_as, pd.DataFrame(own))
             for condition, own in values.items()
         },
         times=_times(results, phase or None, places),

@@ -15,7 +15,7 @@ import numpy as np
 from ...core.numerics import BoolArray, IntArray
 from ..errors import SpecError
 from ..results.statistics import Array
-from .data import Cells, ScalabilityData, cost_of, paired
+from .data import ScalabilityData, cost_of
 
 RESAMPLES = 2000
 """Bootstrap resamples of seeds; probabilities are then known to 0.02."""
@@ -77,8 +77,7 @@ def pareto_points(data: ScalabilityData) -> list[FrontPoint]:
     points = []
     for name, cells in data.costs.items():
         for size in data.all_sizes:
-            hierarchies = [h for h in data.at_size(size) if (h, size) in cells]
-            values, costs = paired_groups([data.performances, cells], hierarchies, size)
+            hierarchies, (values, costs) = data.paired_at(size, [cells])
             if len(hierarchies) < 2 or not len(values):
                 continue
             drawn = _resample(len(values))
@@ -86,25 +85,10 @@ def pareto_points(data: ScalabilityData) -> list[FrontPoint]:
             resampled = non_dominated(
                 data.sign * values[drawn].mean(axis=1), costs[drawn].mean(axis=1)
             ).mean(axis=0)
-            for k, hierarchy in enumerate(hierarchies):
-                points.append(
-                    FrontPoint(
-                        size,
-                        name,
-                        hierarchy,
-                        float(values[:, k].mean()),
-                        float(costs[:, k].mean()),
-                        bool(on_front[k]),
-                        float(resampled[k]),
-                    )
-                )
+            means = values.mean(axis=0).tolist(), costs.mean(axis=0).tolist()
+            places = zip(hierarchies, *means, on_front.tolist(), resampled.tolist(), strict=True)
+            points += [FrontPoint(size, name, *own) for own in places]
     return points
-
-
-def paired_groups(groups: Sequence[Cells], hierarchies: Sequence[str], size: float) -> list[Array]:
-    """Return ``(n_seeds, n_hierarchies)`` values of each group, of the seeds that all share."""
-    columns = [cells[name, size] for cells in groups for name in hierarchies]
-    return np.split(paired(columns), len(groups), axis=1) if columns else [np.empty((0, 0))] * 2
 
 
 def parse_budget(text: str) -> dict[str, float]:
@@ -153,10 +137,8 @@ def best_within(data: ScalabilityData, limits: Mapping[str, float]) -> list[Budg
 
 
 def _choose(data: ScalabilityData, size: float, limits: Mapping[str, float]) -> BudgetChoice:
-    measured = [data.costs[cost] for cost in limits]
     here = data.at_size(size)
-    hierarchies = [name for name in here if all((name, size) in cells for cells in measured)]
-    values, *each = paired_groups([data.performances, *measured], hierarchies, size)
+    hierarchies, (values, *each) = data.paired_at(size, [data.costs[cost] for cost in limits])
     if not len(values):
         return BudgetChoice(size, None, 0.0, (), here)
     unknown = tuple(name for name in here if name not in hierarchies)

@@ -6,7 +6,6 @@ the spec of the study and a hash, so that a later change of the file is found.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +15,15 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from ...core.numerics import pd
 from ..errors import SpecError
 from ..laws.scaling import scaling_law
 from ..laws.size_axis import SizeAxis, check_size, columns_of
+from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import Summary, estimate_over_seeds
+from ..results.analysis import Summary, mean_estimate
 from ..results.comparison import values_of
+from ..results.json_files import CHECKSUM, checksum
 from ..results.notation import format_estimate, format_number
 from ..results.results import Results
 from ..results.statistics import Estimate
@@ -63,14 +65,15 @@ class PredictionFile(NamedTuple):
     @property
     def digest(self) -> str:
         """Hash of everything but the hash."""
-        content = json.dumps(self._replace(sha256=""), sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(content.encode()).hexdigest()
+        return checksum(self._to_dict())
 
     def write(self, path: Path) -> None:
         """Write the file with its hash."""
-        table = self._replace(sha256=self.digest)._asdict()
-        table["predictions"] = [p._asdict() for p in self.predictions]
+        table = {**self._to_dict(), CHECKSUM: self.digest}
         durable.write(path, json.dumps(table, indent=1).encode())
+
+    def _to_dict(self) -> dict[str, object]:
+        return {**self._asdict(), "predictions": [p._asdict() for p in self.predictions]}
 
     @classmethod
     def read(cls, path: Path) -> PredictionFile:
@@ -153,13 +156,23 @@ class CheckedPrediction(NamedTuple):
     measured: Estimate
 
     @property
+    def name(self) -> str:
+        """Hierarchy, size and measure."""
+        return f"{self.prediction.hierarchy}, {self.prediction.size:g}: {self.prediction.title}"
+
+    @property
+    def predicted(self) -> Estimate:
+        """The predicted mean with its interval."""
+        return Estimate(*map(np.asarray, self.prediction[-3:]))
+
+    @property
     def has_held(self) -> bool:
         """Whether the measured mean is within the interval."""
         return self.prediction.low <= float(self.measured.value) <= self.prediction.high
 
 
-@dataclass(frozen=True)
-class PredictionCheck:
+@dataclass(frozen=True, repr=False)
+class PredictionCheck(Report):
     """Predictions compared with later results."""
 
     file: PredictionFile
@@ -171,17 +184,18 @@ class PredictionCheck:
         heading = f"predicted ({LEVEL:.0%})"
         return tabulate(
             [
-                Summary(
-                    _name(c.prediction),
-                    c.seeds,
-                    {heading: _estimate(c.prediction), "measured": c.measured},
-                )
+                Summary(c.name, c.seeds, {heading: c.predicted, "measured": c.measured})
                 for c in self.checked
             ]
         )
 
     @property
-    def sentences(self) -> tuple[str, ...]:
+    def tables(self) -> tuple[SummaryTable]:
+        """The table of means."""
+        return (self.table,)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
         """The number of predictions that held, and those that did not."""
         failed = [c for c in self.checked if not c.has_held]
         total = len(self.checked)
@@ -189,11 +203,9 @@ class PredictionCheck:
         expected = format_number(LEVEL * total)
         lines = [f"{held} of {total} predictions held; {expected} are expected at {LEVEL:.0%}."]
         for c in failed:
-            lines.append(
-                f"Not held: {_name(c.prediction)}, predicted "
-                f"{format_estimate(_estimate(c.prediction))}, measured "
-                f"{format_estimate(c.measured)}."
-            )
+            predicted = format_estimate(c.predicted)
+            measured = format_estimate(c.measured)
+            lines.append(f"Not held: {c.name}, predicted {predicted}, measured {measured}.")
         if {c.seeds for c in self.checked} != {self.file.seeds}:
             lines.append(
                 f"Intervals are for means of {self.file.seeds} seeds; other numbers of seeds were "
@@ -210,16 +222,8 @@ class PredictionCheck:
                 | {"seeds": c.seeds, "measured": float(c.measured.value), "held": c.has_held}
                 for c in self.checked
             ],
-            "sentences": list(self.sentences),
+            "sentences": list(self.notes),
         }
-
-
-def _name(prediction: SizePrediction) -> str:
-    return f"{prediction.hierarchy}, {prediction.size:g}: {prediction.title}"
-
-
-def _estimate(prediction: SizePrediction) -> Estimate:
-    return Estimate(*map(np.asarray, (prediction.value, prediction.low, prediction.high)))
 
 
 def check(file: PredictionFile, results: Results, spec: SpecTable) -> PredictionCheck:
@@ -242,9 +246,8 @@ def check(file: PredictionFile, results: Results, spec: SpecTable) -> Prediction
         measure, values, _ = measured[prediction.measure]
         condition = condition_at.get((prediction.hierarchy, prediction.size))
         if condition in values:
-            numbers = values[condition].to_numpy(dtype=float)
-            estimate = estimate_over_seeds(numbers, measure)
-            checked.append(CheckedPrediction(prediction, len(numbers), estimate))
+            own = pd.DataFrame(values[condition])
+            checked.append(CheckedPrediction(prediction, len(own), mean_estimate(measure, own)))
     if not checked:
         predicted = ", ".join(f"{n:g}" for n in sorted({p.size for p in file.predictions}))
         raise SpecError(

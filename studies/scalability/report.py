@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import TYPE_CHECKING, get_args
 
 from ..errors import SpecError
 from ..laws.size_axis import SizeAxis, columns_of
 from ..laws.universal import Scaling
+from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import Summary
 from ..results.notation import wrapped
 from ..results.results import Results
+from ..results.statistics import plain
 from ..spec.conditions import ConditionSettings
 from .analysis import Scalability
 from .data import collect
@@ -28,17 +28,14 @@ ASSUMED = (
 )
 
 
-class ScalabilityTable(SummaryTable):
-    """A table with ratios to the smallest size."""
-
-    @property
-    def remark(self) -> str:
-        """Description of the intervals."""
-        return "Intervals: of speed-up, efficiency and fraction Fieller's, else as in the table."
+REMARK = (
+    "Speed-up, efficiency and serial fraction have Fieller intervals, other columns those of the "
+    "study's table."
+)
 
 
-@dataclass(frozen=True)
-class ScalabilityReport:
+@dataclass(frozen=True, repr=False)
+class ScalabilityReport(Report):
     """Scalability of hierarchies and their costs; printed or shown by a notebook."""
 
     analysis: Scalability
@@ -47,12 +44,17 @@ class ScalabilityReport:
     @property
     def table(self) -> SummaryTable:
         """Performance, speed-up, efficiency, serial fraction and costs by hierarchy and size."""
-        return _tabulate(self.analysis.summaries)
+        return tabulate(self.analysis.summaries, remark=REMARK)
 
     @property
     def laws(self) -> SummaryTable:
         """Contention, coherency and best size of the universal scalability law by hierarchy."""
-        return _tabulate(self.analysis.law_summaries)
+        return tabulate(self.analysis.law_summaries, remark=REMARK)
+
+    @property
+    def tables(self) -> tuple[SummaryTable, ...]:
+        """The table of hierarchies and sizes, and that of laws if there are any."""
+        return (self.table, self.laws) if self.analysis.laws else (self.table,)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -64,24 +66,13 @@ class ScalabilityReport:
     @property
     def json(self) -> str:
         """Everything as JSON."""
-        return json.dumps(self.analysis.to_dict() | {"remarks": list(self.remarks)}, indent=1)
+        return json.dumps(plain(self.analysis.to_dict() | {"remarks": self.remarks}), indent=1)
 
     def figure(self) -> Figure:
         """Return four panels: performance, efficiency, a cost, and performance against the cost."""
         from .figure import draw  # matplotlib takes its time
 
         return draw(self.analysis)
-
-    def __str__(self) -> str:
-        laws = [str(self.laws), ""] if self.analysis.laws else []
-        return "\n".join([str(self.table), "", *laws, *self.notes])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        notes = "\n".join(map(escape, self.notes))
-        laws = self.laws.html if self.analysis.laws else ""
-        return f"{self.table.html}{laws}<p>{notes}</p>"
 
 
 def analyze(
@@ -107,10 +98,6 @@ def analyze(
     analysis = Scalability(data, budget)
     _ = analysis.choices  # a wrong budget is refused before anything is printed
     return ScalabilityReport(analysis, () if scaling or by_scenario else (ASSUMED,))
-
-
-def _tabulate(lines: Sequence[Summary]) -> ScalabilityTable:
-    return ScalabilityTable(tabulate(lines).titles, tuple(lines))
 
 
 def _scaling_of(

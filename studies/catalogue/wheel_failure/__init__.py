@@ -27,7 +27,7 @@ from ....core.learners.td import FrozenSettings
 from ....core.numerics import pd
 from ....core.plugins.settings import FailureSpan
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures, Summary, estimate_over_seeds, judged
+from ...results.analysis import Analysis, Figures, Summary, judged, mean_estimate
 from ...results.differences import Pair
 from ...results.recovery import BLOCK, FailureCourse, bounded, failure_course
 from ...results.results import KEPT, Results
@@ -159,7 +159,7 @@ class Course(NamedTuple):
             for name, values in course.measured.items():
                 measure = bounded(name, [course], self.longest)
                 known = values[course.had_success]
-                estimates[measure.heading] = estimate_over_seeds(known, measure)
+                estimates[measure.heading] = mean_estimate(measure, pd.DataFrame(known))
         return Summary(f"{self.fault}: {self.adapts}", len(course.success), estimates)
 
 

@@ -1,8 +1,6 @@
 """Commands that read a study, or several: what it measured, how far it is, what was learned."""
 
-import hashlib
 import io
-import json
 from pathlib import Path
 from typing import Literal, TypedDict, Unpack
 
@@ -156,7 +154,7 @@ def compare(
             print_data(f"\n{in_form(comparison.aggregated, form)}")
         return 0
     print_table(comparison.table)
-    print_text("", *comparison.verdicts)
+    print_text("", *comparison.notes)
     if statistics:
         print_text("")
         print_table(comparison.aggregated, comparison.statistics.notes)
@@ -225,11 +223,14 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
         trust_files(directory)
     with open_study(directory) as store:
         store.verify()
-        paths = {folder / name: content for name, content in _contents(store, form).items()}
+        contents = _contents(store, form, folder)
+    paths = {folder / name: content for name, content in contents.items()}
+    from ...results.headers import extends  # pandas takes its time
+
     there = [path for path in paths if path.exists()]
     # Of an export that was killed the first file is left, and is what would be written.
     is_rest = len(there) < len(paths) and all(
-        path.is_file() and path.read_bytes() == paths[path] for path in there
+        path.is_file() and extends(path, paths[path]) for path in there
     )
     if there and not (overwrite or is_rest):
         raise SpecError(f"{there[0]}: exists; --overwrite replaces it, --out writes elsewhere")
@@ -243,11 +244,11 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
     return 0
 
 
-def _contents(store: Store, form: Files) -> dict[str, bytes]:
+def _contents(store: Store, form: Files, folder: Path) -> dict[str, bytes]:
     """Return the content of each file by its name, see `results.published`."""
     from ...catalogue.study import select_published
     from ...presentation.tables import in_csv, in_parquet
-    from ...results import marl_eval, published
+    from ...results import headers, marl_eval, published
     from ...results.results import read
 
     results = read(store)
@@ -257,17 +258,14 @@ def _contents(store: Store, form: Files) -> dict[str, bytes]:
             kept = select_published(outline.study, results)
         return {"results.json": published.dumps(outline, kept).encode()}
     frames = {"episodes": results.episodes, "trials": results.trials}
-    tables = {f"{name}.csv": in_csv(frame).encode() for name, frame in frames.items()}
-    digests = {name: hashlib.sha256(content).hexdigest() for name, content in tables.items()}
-    header = json.dumps(published.header(outline, results) | {"sha256": digests}, indent=1)
-    described = {published.HEADER: f"{header}\n".encode()}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
-        text = marl_eval.dumps(results, kinds, outline.study)
-        return {"marl-eval.json": text.encode()} | described
-    if form == "csv":
-        return tables | described
-    return {f"{n}.parquet": in_parquet(frame) for n, frame in frames.items()} | described
+        files = {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study).encode()}
+    elif form == "csv":
+        files = {f"{name}.csv": in_csv(frame).encode() for name, frame in frames.items()}
+    else:
+        files = {f"{name}.parquet": in_parquet(frame) for name, frame in frames.items()}
+    return files | {published.HEADER: headers.describe(outline, results, files, folder)}
 
 
 @click.command()

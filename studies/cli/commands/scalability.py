@@ -110,7 +110,7 @@ def scalability(
         if form in ("latex", "markdown") and report.analysis.laws:
             print_data(f"\n{in_form(report.laws, form)}")
     else:
-        print_table(report.table, report.table.legend)
+        print_table(report.table)
         if report.analysis.laws:
             print_table(report.laws, ())
         print_text(*report.notes)
@@ -126,5 +126,5 @@ def _check(loaded: StudyResults, file: Path, form: Form) -> int:
         print_data(in_form(checked.table, form))
     else:
         print_table(checked.table, ())
-        print_lines(checked.sentences)
+        print_lines(checked.notes)
     return 0

@@ -111,6 +111,10 @@ def test_serial_and_parallel_runs_with_a_leader_are_equal(tmp_path) -> None:
         ({"agents": "body"}, "agents: not"),
         ({"scenario.perception": [{"agents": "*", "noise": 0.1}]}, "scenario.perception"),
         ({"topology": {"failures": [{"kind": "lost", "agents": "*"}]}}, "topology.failures"),
+        (
+            {"scenario.leader": {"policy": "learned", "learner": {"mirrored": True}}},
+            r"^scenario\.leader\.learner\.mirrored: ",
+        ),
     ],
 )
 def test_what_does_not_go_with_a_leader_is_refused_in_one_line(keys: dict, words: str) -> None:

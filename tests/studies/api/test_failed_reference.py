@@ -37,4 +37,4 @@ def test_a_choice_of_conditions_or_of_a_reference_is_no_failure(study):
     chosen = whole.where("preset != 'default'")
     assert not any("No trial of" in line for line in chosen.notes)
     compared = whole.compare(reference="own-value")
-    assert not any("No trial of" in line for line in compared.verdicts)
+    assert not any("No trial of" in line for line in compared.notes)

@@ -39,7 +39,7 @@ def test_a_study_tells_its_conditions_table_and_notes(study) -> None:
     assert table._repr_html_().count("<tr>") == 2
     assert "<th>default, 3 seeds</th>" in study._repr_html_()
     assert "3 seeds cannot give an adjusted p below 0.05" in " ".join(study.power)
-    assert set(study.power) <= set(study.compare().verdicts), "one number of power for a study"
+    assert set(study.power) <= set(study.compare().notes), "one number of power for a study"
 
 
 def test_a_name_is_text_in_html(study, monkeypatch) -> None:

@@ -9,8 +9,8 @@ from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, draw, metrics_of
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.presentation.tables import Cell, write_rows
-from nested_agents.studies.results.notation import format_number
+from nested_agents.studies.presentation.tables import write_rows
+from nested_agents.studies.results.notation import format_estimate, format_number
 from nested_agents.studies.results.results import STEPS
 from nested_agents.studies.results.statistics import Estimate
 
@@ -84,9 +84,9 @@ def test_every_condition_is_in_the_legend(tmp_path):
 
 
 def test_the_interval_of_a_cell():
-    assert Cell.of(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))).interval == ""
-    assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == "[0.25, 1.00]"
-    assert Cell.of(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))).interval == "[-0.72, -0.53]"
+    assert format_estimate(Estimate(0.5, np.nan, np.nan)) == "0.50"
+    assert format_estimate(Estimate(0.5, 0.25, 1.0)) == "0.50 [0.25, 1.00]"
+    assert format_estimate(Estimate(-0.6, -0.72, -0.53)) == "-0.60 [-0.72, -0.53]"
     assert format_number(float("nan")) == "?"
 
 

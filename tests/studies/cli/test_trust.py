@@ -1,5 +1,6 @@
 """Code that came with a study is run only for who has run it from a spec, or says --trust."""
 
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from nested_agents.core.plugins import trust
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.results.json_files import in_lines
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import SPEC_FILE
 
@@ -350,8 +352,9 @@ def test_a_file_of_results_that_names_a_module_is_refused(
     (reader / "payload" / "study.py").write_text(
         "from nested_agents.studies.catalogue import learning_curve as PART\n"
     )
-    text = (reader / "results.json").read_text()
-    (reader / "results.json").write_text(text.replace('"learning-curve"', '"payload.study:PART"'))
+    table = json.loads((reader / "results.json").read_text())
+    table["spec"]["study"] = "payload.study:PART"
+    (reader / "results.json").write_text(in_lines(table))
     monkeypatch.syspath_prepend(reader)
     capsys.readouterr()
     assert main([command, str(reader / "results.json")]) == (2 if command == "table" else 0)

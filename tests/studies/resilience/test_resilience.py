@@ -144,10 +144,10 @@ def test_kept_teams_are_evaluated_with_losses(arm, tmp_path, capsys):
     assert (compared["condition"], compared["reference"]) == (other["condition"], "chain")
     assert compared["paired"]
     assert [one["position"] for one in chain["single"]] == ["root", "middle", "leaf"]
-    assert chain["intact"][0] == pytest.approx(
+    assert chain["intact"]["value"] == pytest.approx(
         na.load(arm).results.means("chain", "evaluation").mean()
     )
-    costs = [-one["change"][0] for one in chain["single"]]
+    costs = [-one["change"]["value"] for one in chain["single"]]
     assert max(costs) > 0.0, "the base of the arm never moves"
     assert main(["resilience", str(arm), "--fault", "locked", "--out", str(tmp_path / "f")]) == 0
     shown = capsys.readouterr().out

@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -8,7 +9,7 @@ from made_up_results import ablation
 from scipy import stats
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.studies.results.analysis import estimate_of, estimate_over_seeds, verdicts
+from nested_agents.studies.results.analysis import estimate_of, mean_estimate, verdicts
 from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.differences import (
     Difference,
@@ -51,7 +52,7 @@ def test_no_interval_leaves_the_range_of_its_measure(data, measure, n_seeds) -> 
         np.array
     )
     own, base = data.draw(values), data.draw(values)
-    assert within(estimate_over_seeds(own, measure), measure.bounds)
+    assert within(mean_estimate(measure, pd.DataFrame(own)), measure.bounds)
     reach = greatest - least
     assert within(paired_difference(own, base, measure), (-reach, reach))
 
@@ -60,7 +61,7 @@ def test_no_interval_leaves_the_range_of_its_measure(data, measure, n_seeds) -> 
 def test_no_interval_of_rates_leaves_their_range(own, data) -> None:
     base = data.draw(st.lists(st.booleans(), min_size=len(own), max_size=len(own)))
     one, other = np.array(own, float), np.array(base, float)
-    assert within(estimate_over_seeds(one, SUCCESS), (0.0, 1.0))
+    assert within(mean_estimate(SUCCESS, pd.DataFrame(one)), (0.0, 1.0))
     assert within(paired_difference(one, other, SUCCESS), (-1.0, 1.0))
 
 
@@ -195,7 +196,8 @@ def test_an_interval_that_seems_to_contradict_p_is_explained_once(
 ) -> None:
     estimate = Estimate(*map(np.array, (0.2, low, 0.4)))
     sample = np.linspace(0.0, 0.4, 8)
-    found = Difference("a", "evaluation success", 8, estimate, p, p, sample)
+    values = (sample, np.zeros(8))
+    found = Difference("a", "evaluation success", estimate, p, p, values)
     text = " ".join(" ".join(verdicts({"all": [found, found]})).split())
     assert text.count("seem to disagree about 0, p decides.") == is_explained
     assert "with power 0.80 among 2 comparisons in evaluation success." in text

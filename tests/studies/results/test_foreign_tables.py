@@ -113,7 +113,7 @@ def test_scores_are_paired_by_seed_and_item(scores) -> None:
     fewer = scores.drop(index=scores.index[[5, 40]])
     comparison = na.compare_table(fewer, score="tokens", **ROLES)
     assert [float(d.estimate.value) for d in comparison.differences] == pytest.approx([6.0, 3.0])
-    said = " ".join(" ".join(comparison.verdicts).split())
+    said = " ".join(" ".join(comparison.notes).split())
     assert "ring, 2 of 62 scores; star, 1 of 63 scores" in said
     killed = scores[(scores["topology"] != "star") | (scores["run"] > 0)]
     comparison = na.compare_table(killed, score="tokens", **ROLES)
@@ -186,8 +186,8 @@ def test_series_are_compared_at_the_last_common_step() -> None:
     assert (comparison.differences[0].seeds, float(comparison.differences[0].estimate.value)) == (
         7, 3.0,
     )  # fmt: skip
-    assert "step 30, the last" in " ".join(comparison.verdicts)
-    assert "1 of 16 runs" in " ".join(comparison.verdicts)
+    assert "step 30, the last" in " ".join(comparison.notes)
+    assert "1 of 16 runs" in " ".join(comparison.notes)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".jsonl", ".json", ".parquet"])

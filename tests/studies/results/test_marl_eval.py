@@ -104,7 +104,7 @@ def test_runs_are_paired_by_name(tmp_path: Path) -> None:
     comparison = compare(tmp_path, runs)
     (found,) = comparison.differences
     assert (found.seeds, found.sample.tolist()) == (9, pytest.approx([0.5] * 9))
-    assert "B, 1 of 19 runs" in " ".join(comparison.verdicts)
+    assert "B, 1 of 19 runs" in " ".join(comparison.notes)
 
 
 def test_a_run_that_was_killed_is_left_out_and_counted(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_a_run_that_was_killed_is_left_out_and_counted(tmp_path: Path) -> None:
     (found,) = comparison.differences
     assert comparison.analysis.title == "last step return"
     assert (found.seeds, float(found.estimate.value)) == (3, 0.0)
-    said = " ".join(comparison.verdicts)
+    said = " ".join(comparison.notes)
     assert "step_count 400" in said
     assert "1 of 8 runs" in said
     assert "B, seed_0" in said
@@ -134,7 +134,7 @@ def test_series_are_aligned_by_step_count_whatever_their_keys(tmp_path: Path) ->
         comparison = compare(tmp_path, runs)
         assert comparison.analysis.measure.name == "return"
         assert float(comparison.differences[0].estimate.value) == 0.0, k
-        assert "step_count 400" in " ".join(comparison.verdicts)
+        assert "step_count 400" in " ".join(comparison.notes)
 
 
 def test_a_run_without_absolute_metrics_does_not_switch_what_is_compared(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_a_run_without_absolute_metrics_does_not_switch_what_is_compared(tmp_pat
     runs["B"]["seed_0"] = SERIES
     comparison = compare(tmp_path, runs)
     assert comparison.analysis.title == "evaluation return"
-    assert "1 of 8 runs" in " ".join(comparison.verdicts)
+    assert "1 of 8 runs" in " ".join(comparison.notes)
     assert compare(tmp_path, runs, phase="last step").differences[0].seeds == 4
 
 

@@ -1,10 +1,11 @@
 """Intervals of recovery cover the truth in simulated studies whose recovery is known."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from nested_agents.core.interface.measures import Measure
-from nested_agents.studies.results.analysis import estimate_over_seeds
+from nested_agents.studies.results.analysis import mean_estimate
 from nested_agents.studies.results.recovery import FailureCourse, bounded
 
 STUDIES = 300
@@ -36,6 +37,6 @@ def test_nominal_intervals_cover_the_true_mean(name: str, n_seeds: int) -> None:
         course = simulated(rng, n_seeds)
         measure: Measure = bounded(name, [course], longest=50)
         values = course.measured[name][course.had_success]
-        estimate = estimate_over_seeds(values, measure)
+        estimate = mean_estimate(measure, pd.DataFrame(values))
         covered += bool(estimate.low <= truth <= estimate.high)
     assert 0.92 <= covered / STUDIES <= 0.98

@@ -43,10 +43,10 @@ def test_predictions_hold_for_the_same_law_and_fail_for_another(tables):
     assert file.predictions[0].low < 4.0 < file.predictions[0].high
     same = check(file, load(tables / "large.csv").results, {})
     assert all(own.has_held for own in same.checked)
-    assert "2 of 2 predictions held" in same.sentences[0]
+    assert "2 of 2 predictions held" in same.notes[0]
     other = check(file, load(tables / "other.csv").results, {})
     assert not any(own.has_held for own in other.checked)
-    assert "Not held: all teams, 16" in other.sentences[1]
+    assert "Not held: all teams, 16" in other.notes[1]
 
 
 def test_a_changed_file_is_refused(tables, tmp_path):
