@@ -90,10 +90,14 @@ def select_condition(spec: Spec, column: Spec) -> dict[str, Any]:
     selected = narrow_sweep(spec, column) | {"overrides": matching}
     if selected.get("study") == "hierarchies":  # refuses a single one; scaling measures the same
         selected["study"] = "scaling"
-    text = json.dumps({key: value for key, value in selected.items() if value not in ({}, [])})
+    return with_full_paths({key: v for key, v in selected.items() if v not in ({}, [])})
+
+
+def with_full_paths(spec: Spec) -> dict[str, Any]:
+    """Return a published spec with the full paths of the files that it names."""
     files = re.compile(r'(?<=")\.\./[^"]*(?=\.py:)')
     table: dict[str, Any] = json.loads(
-        files.sub(lambda path: str((RESULTS / path[0]).resolve()), text)
+        files.sub(lambda path: str((RESULTS / path[0]).resolve()), json.dumps(spec))
     )
     return table
 
@@ -133,6 +137,8 @@ def lines(rerun: PublishedCondition, out: Path, jobs: int | None) -> Iterator[st
     chosen = " or ".join(f"seed == {seed}" for seed in rerun.seeds)
     published = estimates(load(rerun.name).where(chosen).results, rerun.condition)
     for title, new in estimates(study.results, condition).items():
+        if title not in published:  # a measure that is younger than the table
+            continue
         old = published[title]
         verdict = "agree" if agree(old, new) else "**disagree**"
         yield (

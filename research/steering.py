@@ -43,6 +43,10 @@ TEAMS = (
     ("64, sixteen first", 64, "sixty-four", "evaluation", "64, sixteen first"),
     ("64, trained with 8", 64, "from-eight", "evaluation:sixty-four", "default"),
     ("64, wide box first", 64, "wide", "evaluation:sixty-four", "8, wide box"),
+    ("64, no leader", 64, "leaders", "evaluation:64, no leader", "default"),
+    ("64, leader by rule", 64, "leaders", "evaluation:64, rule", "default"),
+    ("64, learned leader", 64, "leaders", "evaluation:64, learned", "default"),
+    ("64, random leader", 64, "leaders", "evaluation:64, random", "default"),
     ("128, trained with 8", 128, "from-eight-128", "evaluation:128", "default"),
 )
 """A row's name, the number of robots, published results, and their phase and condition."""

@@ -20,6 +20,7 @@ LARGE_TEAM = (
     "training success", "training success, difference",
     "evaluation success", "evaluation success, difference",
 )  # fmt: skip
+LEADERS = "no leader", "rule", "learned", "random"
 COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 
 
@@ -38,6 +39,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("rounds", ("evaluation success", "success, sixty-four")),
         ("from-eight", ("evaluation success", "success, sixty-four")),
         ("wide", ("evaluation success", "success, sixty-four")),
+        ("leaders", ("evaluation success", *(f"success, 64, {name}" for name in LEADERS))),
         ("large-team", LARGE_TEAM),
         ("own-value", ("evaluation success",)),
         ("transfer", ("evaluation success", "success, four", "success, eight")),

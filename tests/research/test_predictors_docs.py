@@ -22,6 +22,7 @@ LAST = "success last 5", "evaluation success"
         ("predictors-teams-three", LAST),
         ("predictors-eight", TRAINED),
         ("poses", TRAINED),
+        ("poses-controls", TRAINED),
         ("poses-4", TRAINED),
         ("poses-8", TRAINED),
         ("predictors-cartpole-fine", (*LAST, "evaluation steps")),

@@ -83,18 +83,13 @@ def _space_over(name: str, shared: Sequence[StateVariable]) -> BoxStateSpace:
     return BoxStateSpace(space_of(name, _SPEED, shared), tuple(shared))
 
 
-def _space_of_paper(name: str, bearing: str, distance: str) -> BoxStateSpace:
-    """Return the state of Eq. 1. Membership functions are spread evenly over all ranges.
-
-    The goal of an agent, to which bearing and distance refer, is the goal of the box or, in
-    ``paper-box``, the box itself.
-    """
-    names = ("heading", bearing, distance, "box_orientation", "box_goal_bearing")
+def _space_of_paper() -> BoxStateSpace:
+    """Return the state of Eq. 1, with even membership functions of the distance of the box."""
+    names = ("heading", "goal_bearing", "goal_distance", "box_orientation", "box_goal_bearing")
     shared = [find_variable(STATE_VARIABLES, one) for one in names]
-    shared[1] = replace(shared[1], variable=replace(shared[1].variable, centers=(), labels=()))
-    box_distance = find_variable(STATE_VARIABLES, "box_distance")
+    distance = find_variable(STATE_VARIABLES, "box_distance")
     even = Variable("box_distance", "m", 0.0, 1.2, mirrored="same")
-    return _space_over(name, [*shared, replace(box_distance, variable=even)])
+    return _space_over("paper", [*shared, replace(distance, variable=even)])
 
 
 _PROGRESS = ("box_distance", "approach")
@@ -102,8 +97,17 @@ _PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", *_P
 _TEAM = ("gap", "face_bearing", "side", "others_away")
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
-    "paper": _space_of_paper("paper", "goal_bearing", "goal_distance"),
-    "paper-box": _space_of_paper("paper-box", "box_bearing", "robot_box_distance"),
+    "paper": _space_of_paper(),
+    # The same with the box as the goal of an agent.
+    "paper-box": build_space(
+        "paper-box",
+        "heading",
+        "box_bearing",
+        "robot_box_distance",
+        "box_orientation",
+        "box_goal_bearing",
+        "box_distance",
+    ),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
     "relational": build_space("relational", *_PUSHING),
     "pose": build_space("pose", *_PUSHING, "bend", "box_turn"),

@@ -148,6 +148,19 @@ def gap(situation: Situation, robot: Robot) -> float:
     return robot.gap
 
 
+@_angle(_EVEN, ())
+def heading(situation: Situation, robot: Robot) -> float:
+    """Heading of the robot in the world frame (Eq. 1)."""
+    return wrap_one(robot.heading)
+
+
+@_variable("m", 0.0, 0.5, centers=(0.05, 0.1, 0.15, 0.25, 0.5), mirrored="same")
+def robot_box_distance(situation: Situation, robot: Robot) -> float:
+    """Distance of the robot from the center of the box."""
+    dx, dy = situation.box[0] - robot.x, situation.box[1] - robot.y
+    return np.sqrt(dx * dx + dy * dy)
+
+
 @_angle(_SIDES)
 def box_bearing(situation: Situation, robot: Robot) -> float:
     """Bearing of the box in the frame of the robot."""
@@ -275,12 +288,6 @@ def path_cross_track_error(situation: Situation, robot: Robot) -> float:
     return _miss(situation, _path(situation))
 
 
-@_angle(_EVEN, ())
-def heading(situation: Situation, robot: Robot) -> float:
-    """Angle of the robot in the world frame (Eq. 1)."""
-    return wrap_one(robot.heading)
-
-
 @_angle((), ())
 def goal_bearing(situation: Situation, robot: Robot) -> float:
     """Bearing of the goal in the frame of the robot (Eq. 1)."""
@@ -292,12 +299,6 @@ def goal_bearing(situation: Situation, robot: Robot) -> float:
 def goal_distance(situation: Situation, robot: Robot) -> float:
     """Distance of the robot from the goal (Eq. 1)."""
     return np.hypot(situation.goal[0] - robot.x, situation.goal[1] - robot.y)
-
-
-@_variable("m", 0.0, 1.5, mirrored="same")
-def robot_box_distance(situation: Situation, robot: Robot) -> float:
-    """Distance of the robot from the center of the box."""
-    return np.hypot(situation.box[0] - robot.x, situation.box[1] - robot.y)
 
 
 @_angle(_EVEN, (), common=True)
