@@ -34,7 +34,6 @@ _PLACES = {
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
     "BatchTDSettings": ("core.learners.batch", "BatchTDSettings"),
-    "Blocks": ("core.interface.prediction", "Blocks"),
     "BoxPushing": ("scenarios.box_pushing.scenario", "BoxPushing"),
     "BoxPushingSettings": ("scenarios.box_pushing.config", "BoxPushingSettings"),
     "ChainView": ("scenarios.kinematic_chain.variables", "ChainView"),

@@ -15,7 +15,6 @@ u, ``m dv/dt = k (u - v)``. With ``tau = m / k`` and u held for a period T this 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property, reduce
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -23,7 +22,7 @@ import numpy as np
 from pydantic import Field
 
 from ..core.interface.measures import SUCCESS, Measure
-from ..core.interface.prediction import Blocks, Prediction, Tables
+from ..core.interface.prediction import Prediction
 from ..core.interface.scenario import Scenario, Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
 from ..core.numerics import FloatArray, IntArray
@@ -156,7 +155,7 @@ def observe(places: FloatArray) -> FloatArray:
     return np.stack([places, places - places.mean(axis=-1, keepdims=True)], axis=-1)
 
 
-class LineUpPrediction(Prediction, Tables):
+class LineUpPrediction(Prediction):
     """Exact prediction of the carts.
 
     Parameters
@@ -167,11 +166,6 @@ class LineUpPrediction(Prediction, Tables):
 
     def __init__(self, places: FloatArray) -> None:
         self._places = places
-
-    @cached_property
-    def _sums(self) -> FloatArray:
-        """Sum of the places after each joint action ``(A ** n,)``."""
-        return reduce(lambda sums, places: np.add.outer(sums, places).ravel(), self._places)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, 2)`` of `agent` for joint actions ``(m, n)``."""
@@ -188,23 +182,6 @@ class LineUpPrediction(Prediction, Tables):
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
         return reward(self._after(joint_actions))
-
-    def tables(self) -> Tables:
-        """Return itself, because it has tables of all joint actions."""
-        return self
-
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next states of `agent` for all joint actions."""
-        n, n_actions = self._places.shape
-        divisor = n_actions ** (n - 1 - agent)
-        own = self._places[agent][:, None]
-        lead = own - self._sums.reshape(-1, n_actions, divisor) / n
-        return Blocks(own.copy(), lead.reshape(-1, 1), divisor)
-
-    def reward_table(self) -> FloatArray:
-        """Return the rewards ``(A ** n,)`` of all joint actions by index."""
-        n, n_actions = self._places.shape
-        return self.rewards(np.indices((n_actions,) * n).reshape(n, -1).T)
 
     def _after(self, joint_actions: IntArray) -> FloatArray:
         """Return the places ``(m, n)`` [m] after joint actions ``(m, n)``."""

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import settings
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
@@ -115,7 +115,7 @@ class LineWorld(Scenario):
         return np.stack([speeds, rolled, np.broadcast_to(gaps[:, None], speeds.shape)], axis=2)
 
 
-class LinePrediction(Prediction, Tables):
+class LinePrediction(Prediction):
     """Exact predictions of a line world's next step."""
 
     def __init__(self, world: LineWorld) -> None:
@@ -127,19 +127,6 @@ class LinePrediction(Prediction, Tables):
 
     def rewards(self, joint_actions: np.ndarray) -> np.ndarray:
         return self.world.reward(self.world.after(joint_actions)[2])
-
-    def tables(self) -> "LinePrediction":
-        return self
-
-    def blocks(self, agent: int) -> Blocks:
-        w, a = self.world.shape[1], self.n_actions
-        divisor = a ** (self.n - w * (agent // w + 1))
-        everything = self.states(agent, decode(np.arange(a**self.n), self.n, a))
-        local = self.states(agent, decode(np.arange(a**w) * divisor, self.n, a))
-        return Blocks(local[:, :2].copy(), everything[:, 2:].copy(), divisor)
-
-    def reward_table(self) -> np.ndarray:
-        return self.rewards(decode(np.arange(self.n_actions**self.n), self.n, self.n_actions))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -12,11 +12,11 @@ from typing import Self
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..hierarchy.stages import Inbox, is_fully_communicating
+from ..hierarchy.stages import Inbox
 from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
 from ..interface.experience import Experience, Observation
 from ..interface.measures import Measure
-from ..interface.prediction import NOT_EXPLORING, UNPREDICTED, Prediction
+from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
 from ..interface.scenario import Members, Scenario, carried_rows, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
@@ -24,10 +24,10 @@ from ..models.predictors import GivenPredictor, Mirror
 from ..models.team_model import TeamModel
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
 from ..plugins.words import must_inherit
-from ..search.evaluator import NOBODY, Aggregation, DecisionContext, Evaluator
+from ..search.evaluator import Aggregation, DecisionContext, Evaluator
 from ..search.exploration import Explorer
 from .action_counts import ActionCounts
-from .valuing import evaluator_of, is_private
+from .valuing import TeamSearch
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
 
@@ -53,8 +53,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         Inputs of the value function as a state space, and the rule base over it.
     explorer
         Chooses actions by their values.
-    evaluator
-        Search that evaluates actions; None if actions are drawn at random.
+    search
+        Searches for actions, with an evaluator of actions.
     model
         Predictor, with self-model and calibration.
     mirror
@@ -72,119 +72,62 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def __init__(self, settings: LearnerSettings, context: AgentContext) -> None:
         scenario = context.scenario
-        hierarchy = context.hierarchy
         check_prediction(settings, scenario)
+        _check_settings(settings, context)
         self.settings = settings
         self.scenario = scenario
-        self.hierarchy = hierarchy
         self.members = context.members
         self.action_set = scenario.action_set
-        n = len(hierarchy)
-        if settings.values_actions and not isinstance(settings.predictor, GivenPredictor):
-            raise ValueError(
-                f"learner.predictor.kind = {settings.predictor.kind!r}: learner.kind = "
-                f"{settings.kind!r} decides without a prediction"
-            )
+        self.rng = np.random.Generator(np.random.PCG64(context.seed))
         self.model = TeamModel(
             settings.predictor, settings.self_model, settings.calibration, scenario
         )
-        if settings.is_mirrored and not context.is_whole:
-            raise ValueError("learner.mirrored = true: needs the whole team in one part; use false")
-        self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
-        self.rows = rows_of(scenario, self.members, shared=settings.weights == "role")
-        self._senders = senders_of(settings, hierarchy)
+        self._senders = senders_of(settings, context.hierarchy)
         self._n_told = max(map(len, self._senders), default=0)
         self.space, self.rules = settings.rules_over(
             scenario.state_space, scenario.action_set, self._n_told
         )
+        self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
+        self.rows = rows_of(scenario, self.members, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
         self.learner: Learner = settings.build(self.rules, rows)
         must_inherit("learner.kind", self.learner, Learner)
-        self._placement = context
-        self._is_checked = False
-        self._evaluators: dict[Hierarchy, Evaluator | None] = {}
-        self._left = NOBODY
-        self._actions_of_left = NOBODY
-        self.views: Views | None = None
-        self.costs: tuple[Measure, ...] = ()
-        self.evaluator = self._evaluator()
-        self._neutral = np.full(n, self.action_set.neutral)
+        learned = self.learner if isinstance(self.learner, Evaluator) else None
+        self.search = TeamSearch(settings, self.rules, learned, context)
+        n = len(context.hierarchy)
         own_rows = dict(zip(self.members.tolist(), self.rows.tolist(), strict=True))
         self._row_of = [own_rows.get(agent) for agent in range(n)]
-        if is_private(settings, scenario):
-            n_rules = self.learner.theta.shape[1]
+        self.views: Views | None = None
+        self.costs: tuple[Measure, ...] = ()
+        if self.search.is_private:
             plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
+            n_rules = self.learner.theta.shape[1]
             self.views = Views(settings, context, self._row_of, n_rules, self.model, plans=plans)
             self.costs = self.views.costs
-        self._searches_jointly = self._can_search_jointly(context)
         self.explorer: Explorer = settings.exploration.build(n)
         must_inherit("learner.exploration.kind", self.explorer, Explorer)
-        self.rng = np.random.Generator(np.random.PCG64(context.seed))
+        self._neutral = np.full(n, self.action_set.neutral)
         is_conditional = settings.decision.teammates == "conditional" and bool(self.evaluator)
-        n_actions = len(scenario.action_set)
-        self.action_counts = ActionCounts(n, n_actions, is_conditional=is_conditional)
+        self.action_counts = ActionCounts(n, len(self.action_set), is_conditional=is_conditional)
 
-    def _evaluator(self) -> Evaluator | None:
-        """Return the search for the agents that are present."""
-        learned = self.learner if isinstance(self.learner, Evaluator) else None
-        return evaluator_of(
-            self.settings, self.rules, learned, self._placement, self.hierarchy, self._left
-        )
-
-    def _can_search_jointly(self, context: AgentContext) -> bool:
-        """Return whether one search finds the actions of all agents, see `act`."""
-        return (
-            self.evaluator is not None
-            and context.is_whole
-            and self.views is None
-            and type(self.evaluator).decide is not Evaluator.decide
-            and not context.messages_fail
-            and is_fully_communicating(context.hierarchy)
-        )
+    @property
+    def evaluator(self) -> Evaluator | None:
+        """Evaluator of actions; None if actions are drawn at random."""
+        return self.search.evaluator
 
     def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
         """Search in a repaired hierarchy; all agents know the actions of those that have left."""
-        self._evaluators.setdefault(self.hierarchy, self.evaluator)
-        self.hierarchy = hierarchy
-        self._left = left
-        self._actions_of_left = actions
-        if hierarchy not in self._evaluators:
-            self._evaluators[hierarchy] = self._evaluator()
-        new = self._evaluators[hierarchy]
-        if new is not None and self.evaluator is not None:
-            new.counts = self.evaluator.counts
-        self.evaluator = new
+        self.search.rearrange(hierarchy, left, actions)
 
     @property
     def counts(self) -> Counts:
         """Number of evaluations so far."""
-        return Counts() if self.evaluator is None else self.evaluator.counts
+        return self.search.counts
 
     @property
     def weight_bytes(self) -> int:
         """Memory of the consequent weights [bytes]."""
         return self.learner.theta.nbytes
-
-    def _check(self, prediction: Prediction) -> None:
-        """Refuse a prediction without what the search requires.
-
-        Raises
-        ------
-        ValueError
-            If rewards or predictions from predicted states are missing; one line.
-        """
-        rule = self.settings.decision.rule
-        if self.evaluator is None or rule == "value":
-            return
-        if prediction.rewards(self._neutral[None]) is None:
-            raise ValueError(
-                f"learner.decision.rule = {rule!r}: no rewards are predicted, use value"
-            )
-        if self.evaluator.continues and prediction.after(self._neutral) is None:
-            raise ValueError(
-                "learner.decision.evaluator: plans of several decisions need a scenario that "
-                "predicts from predicted states"
-            )
 
     def reset(self, episode: int, *, learn: bool) -> None:
         """Start an episode."""
@@ -199,9 +142,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             missing = np.full((len(left), self._n_told), float(len(self.action_set)))
             left = np.hstack([left, missing])
         prediction = UNPREDICTED if self.settings.values_actions else self.model.predict(seen)
-        if not self._is_checked:
-            self._check(prediction)
-            self._is_checked = True
+        self.search.check(prediction, self._neutral)
         theta = self.learner.theta
         return FuzzyInputs(
             left=left,
@@ -219,7 +160,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.evaluator is None or exploring is None:
             return None
         first = DecisionContext(
-            agent=self.hierarchy.order[0],
+            agent=self.search.hierarchy.order[0],
             joint_action=self._neutral.copy(),
             prediction=inputs.prediction,
             weights=inputs.weights,
@@ -236,8 +177,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """
         if self.evaluator is None:
             return self.rng.integers(len(self.action_set), size=len(inbox.agents))
-        is_first = inbox.agents[0] == self.hierarchy.order[0]
-        if self._searches_jointly and is_first and inputs.values is None:
+        is_first = inbox.agents[0] == self.search.hierarchy.order[0]
+        if self.search.is_joint and is_first and inputs.values is None:
             inputs.joint_action = self._joint_search(inputs)
         if inputs.joint_action is not None:
             return inputs.joint_action[inbox.agents]
@@ -255,9 +196,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Return the action of an agent, given the received actions."""
         assert self.evaluator is not None
         known = (self._neutral if inputs.previous is None else inputs.previous).copy()
-        if len(self._left):
-            senders = np.concatenate([senders, self._left])
-            actions = np.concatenate([actions, self._actions_of_left])
+        if len(self.search.left):
+            senders = np.concatenate([senders, self.search.left])
+            actions = np.concatenate([actions, self.search.actions_of_left])
         known[senders] = actions
         if self._senders:
             told = known[self._senders[agent]]
@@ -299,7 +240,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Return agreement and communication, for agents with views of their own."""
         if self.views is None:
             return {}
-        return self.views.decision_costs(agreement(inputs.expected, joint_action), self.hierarchy)
+        share = agreement(inputs.expected, joint_action)
+        return self.views.decision_costs(share, self.search.hierarchy)
 
     def record_values(self, inputs: FuzzyInputs) -> None:
         """Keep the values of actions in this decision; each agent then searches on its own."""
@@ -350,10 +292,10 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             reward = self.mirror.reward(reward)
             left = self.mirror.states(left)
             taken = np.tile(taken, 2)
-        # Only the leader's learner needs to know durations.
-        lasting = {"duration": experience.duration} if experience.duration > 1 else {}
-        ended = transition.terminated
-        self.count(self.learner.observe_decision(left, taken, states, reward, ended, **lasting))
+        updates = self.learner.observe_decision(
+            left, taken, states, reward, transition.terminated, experience.duration
+        )
+        self.count(updates)
         if experience.last:
             self.end_episode()
 
@@ -433,3 +375,14 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.learner.load_state_dict(select_prefix("learner.", state))
         for name, part in self.model.adaptive.items():
             part.load_state_dict(select_prefix(f"{name}.", state))
+
+
+def _check_settings(settings: LearnerSettings, context: AgentContext) -> None:
+    """Refuse a predictor without use, and mirrored experience of a part of the team."""
+    if settings.values_actions and not isinstance(settings.predictor, GivenPredictor):
+        raise ValueError(
+            f"learner.predictor.kind = {settings.predictor.kind!r}: learner.kind = "
+            f"{settings.kind!r} decides without a prediction"
+        )
+    if settings.is_mirrored and not context.is_whole:
+        raise ValueError("learner.mirrored = true: needs the whole team in one part; use false")

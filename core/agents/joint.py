@@ -17,20 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from ..interface.abilities import Embodiment, horizon_of
-from ..interface.prediction import (
-    Assumptions,
-    Blocks,
-    EmbodiedPrediction,
-    Prediction,
-    Tables,
-    rewards_of,
-)
+from ..interface.prediction import Assumptions, EmbodiedPrediction, Prediction
 from ..interface.scenario import Scenario, Transition, checked_scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
@@ -183,10 +175,6 @@ class JointAgents(Scenario):
         shape = (*joint_actions.shape[:-1], len(self.scenario.agents))
         return self._local[joint_actions].reshape(shape)
 
-    def every(self) -> IntArray:
-        """Return all actions ``(A, 1)`` of a single joint agent."""
-        return np.arange(len(self._local))[:, None]
-
     def joined(self, parts: Sequence[FloatArray]) -> FloatArray:
         """Return the states of a joint agent from those of its block, variables last."""
         own = [part[..., : self._n_each] for part in parts]
@@ -196,8 +184,8 @@ class JointAgents(Scenario):
         return np.array([self.joined([states[i] for i in block]) for block in self.blocks])
 
 
-class JointPrediction(Prediction, Tables):
-    """Prediction of a scenario for joint agents. A single joint agent always has tables.
+class JointPrediction(Prediction):
+    """Prediction of a scenario for joint agents.
 
     Parameters
     ----------
@@ -211,7 +199,6 @@ class JointPrediction(Prediction, Tables):
         self._prediction = prediction
         self._joint = joint
         self.repeats = prediction.repeats
-        self._tables = prediction.tables()
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of a joint agent for joint actions ``(m, M)``."""
@@ -222,33 +209,6 @@ class JointPrediction(Prediction, Tables):
     def rewards(self, joint_actions: IntArray) -> FloatArray | None:
         """Return the rewards of joint actions ``(m, M)``, if the scenario predicts them."""
         return self._prediction.rewards(self._joint.actions(joint_actions))
-
-    @cached_property
-    def rewarded(self) -> bool:  # type: ignore[override]  # depends on the prediction
-        """Whether there is a table of rewards."""
-        if self._joint.whole:
-            return self.rewards(self._joint.every()[:1]) is not None
-        return self._tables is not None and self._tables.rewarded
-
-    def tables(self) -> Tables | None:
-        """Return tables of a single joint agent, or those of the scenario if they have rewards."""
-        return self if self._joint.whole or self.rewarded else None
-
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next states of a joint agent for all joint actions."""
-        if self._joint.whole:  # a single agent has shared variables only
-            return Blocks(np.zeros((1, 0)), self.states(agent, self._joint.every()), 1)
-        assert self._tables is not None
-        blocks = [self._tables.blocks(i) for i in self._joint.blocks[agent]]
-        own = np.concatenate([b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks], 1)
-        return replace(blocks[0], own=own, own_rows=np.zeros(0, dtype=np.int64))
-
-    def reward_table(self) -> FloatArray:
-        """Return the rewards of all joint actions."""
-        if self._joint.whole:
-            return rewards_of(self, self._joint.every())
-        assert self._tables is not None
-        return self._tables.reward_table()
 
 
 class JointBodiesPrediction(JointPrediction, EmbodiedPrediction):

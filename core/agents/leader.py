@@ -15,11 +15,13 @@ import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox
+from ..interface.abilities import options_of
 from ..interface.agents import AgentContext
 from ..interface.experience import Decision, Experience, Observation
 from ..interface.options import LeaderOptions
-from ..interface.scenario import Scenario, Transition
+from ..interface.scenario import Scenario, Transition, prediction_of
 from ..learners.fitted_q import FittedQSettings
+from ..learners.learner import TeamSettings
 from ..numerics import FloatArray, IntArray
 from .fuzzy import FuzzyAgents
 from .views import FuzzyInputs
@@ -62,10 +64,12 @@ class Leader:
 
     Parameters
     ----------
-    options
-        Options of the scenario in which the leader is built.
+    scenario, options
+        Scenario in which the leader is built, and its options.
     seed
         Seed of the leader's random numbers.
+    needs_prediction
+        Whether the agents below decide or learn by predictions.
 
     Attributes
     ----------
@@ -73,16 +77,29 @@ class Leader:
         The agent that decides and learns; empty for a leader by rule.
     """
 
-    def __init__(self, options: LeaderOptions, seed: np.random.SeedSequence) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        options: LeaderOptions,
+        seed: np.random.SeedSequence,
+        *,
+        needs_prediction: bool,
+    ) -> None:
         self.agents: tuple[FuzzyAgents, ...] = ()
-        self._view = LeaderView(options)
+        self._needs_prediction = needs_prediction
         if options.learner is not None:
             assert isinstance(options.learner, FittedQSettings)
-            hierarchy = Hierarchy(self._view.agents, [])
-            context = AgentContext(self._view, hierarchy, np.arange(1), seed)
+            view = LeaderView(options)
+            context = AgentContext(view, Hierarchy(view.agents, []), np.arange(1), seed)
             with keys_below("scenario.leader."):
                 self.agents = (FuzzyAgents(options.learner, context),)
+        self.enter(scenario, options)
         self.reset()
+
+    def enter(self, scenario: Scenario, options: LeaderOptions) -> None:
+        """Lead the agents of a scenario, which may be another one in every episode."""
+        self._scenario = scenario
+        self._options = options
 
     def reset(self) -> None:
         """Start an episode."""
@@ -91,7 +108,7 @@ class Leader:
         self._return = 0.0
 
     def lead(
-        self, options: LeaderOptions, observation: Observation, *, explore: bool
+        self, observation: Observation, *, explore: bool
     ) -> tuple[Observation, IntArray | None]:
         """Decide on an option if none goes on.
 
@@ -102,20 +119,23 @@ class Leader:
         IntArray or None
             Their actions ``(n,)``, if a given skill acts for them.
         """
+        options = self._options
         goes_on = 0 < self._duration < options.limit and options.advance()
         if not goes_on:
-            states = options.begin(self._decide(options, explore=explore))
+            states = options.begin(self._decide(explore=explore))
             observation = observation._replace(states=states)
+            if self._needs_prediction:  # an option that begins changes what is predicted
+                observation = observation._replace(prediction=prediction_of(self._scenario))
             self._duration = 0
         self._duration += 1
         return observation, options.joint_action()
 
-    def _decide(self, options: LeaderOptions, *, explore: bool) -> int:
+    def _decide(self, *, explore: bool) -> int:
         """Return an option; a leader that learns has first learned from the last one."""
         if not self.agents:
-            return options.rule()
+            return self._options.rule()
         (agent,) = self.agents
-        observation = Observation(options.observe()[None])
+        observation = Observation(self._options.observe()[None])
         if self._decided is not None and explore:
             self._learn(observation.states, terminated=False, last=False)
         inputs = agent.observe(observation, explore=explore)
@@ -124,7 +144,7 @@ class Leader:
         self._decided = observation, action, inputs
         return int(action[0])
 
-    def learn(self, options: LeaderOptions, experience: Experience) -> None:
+    def learn(self, experience: Experience) -> None:
         """Add the mean reward of a step below, and learn if the episode ends with it.
 
         A lost task is terminal to the leader. A terminal reward repeats forever if the state does.
@@ -139,7 +159,7 @@ class Leader:
         self._return += discount ** (self._duration - 1) * reward
         if experience.last:
             is_terminal = transition.terminated or transition.truncated
-            self._learn(options.observe()[None], terminated=is_terminal, last=True)
+            self._learn(self._options.observe()[None], terminated=is_terminal, last=True)
 
     def _learn(self, states: FloatArray, *, terminated: bool, last: bool) -> None:
         """Learn from an option that has ended in some states ``(1, d)`` of the leader."""
@@ -149,3 +169,42 @@ class Leader:
         decision = Decision(action, (inputs,))
         self.agents[0].learn(Experience(before, decision, result, last, self._duration), inputs)
         self._return = 0.0
+
+
+def build_leader(
+    settings: TeamSettings,
+    scenario: Scenario,
+    seed: np.random.SeedSequence,
+    *,
+    messages_fail: bool,
+) -> Leader | None:
+    """Return the leader of a team with some settings, or None if the scenario has no options.
+
+    Raises
+    ------
+    ValueError
+        If messages fail or there are several environments; one line.
+    """
+    options = options_of(scenario)
+    if options is None:
+        return None
+    if messages_fail or settings.n_environments > 1:
+        key = "topology.failures" if messages_fail else "learner.environments"
+        raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
+    (own_seed,) = seed.spawn(1)
+    return Leader(scenario, options, own_seed, needs_prediction=settings.needs_prediction)
+
+
+def enter_scenario(leader: Leader | None, scenario: Scenario) -> None:
+    """Let the leader of a team, if there is one, lead in a scenario.
+
+    Raises
+    ------
+    ValueError
+        If only one of the team and the scenario has a leader; one line.
+    """
+    options = options_of(scenario)
+    if (leader is None) != (options is None):
+        raise ValueError("scenario.leader: build the team in a scenario with the same leader")
+    if leader is not None and options is not None:
+        leader.enter(scenario, options)

@@ -4,50 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..hierarchy.failures import LeftAgents, MessageFailure
+from ..hierarchy.failures import LeftAgents, MessageFailure, actions_of_left
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
 from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
-from ..interface.abilities import options_of
 from ..interface.agents import (
-    AgentContext,
     Agents,
     Counts,
-    Inspectable,
     ObservesJointActions,
     Rearrangeable,
-    ReportsCosts,
-    ReportsResources,
     SendsPayloads,
     StateDict,
     ValuesStates,
     Vectorized,
-    select_prefix,
 )
 from ..interface.environments import Transitions
 from ..interface.experience import Decision, Experience, Observation
-from ..interface.measures import Measure
 from ..interface.prediction import UNPREDICTED
 from ..interface.scenario import Scenario, checked_scenario, prediction_of
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
-from .inspection import inspect_agents
-from .kept import begin_with
-from .leader import Leader
+from .decision_costs import DecisionCosts
+from .inspection import inspect_agents, record_values, recorded_values
+from .leader import build_leader, enter_scenario
+from .parts import build_parts, counts_of, load_state, state_of, weight_bytes_of
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
 
 A = TypeVar("A", bound=Agents[Any])
-MESSAGES = Measure("messages", "messages", gathering="sum", better="lower", least=0.0)
-"""Number of received messages, a measure of teams that send payloads."""
 
 
 class Team:
@@ -111,51 +103,31 @@ class Team:
         self.hierarchy = hierarchy
         self.action_set = checked.action_set
         self.needs_prediction = settings.needs_prediction
-        kinds = settings.members(checked, hierarchy)
-        seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
-        parts: list[Agents[Any]] = []
-        self._part_of = [0] * len(hierarchy)
-        for (members, own, kept), own_seed in zip(kinds, seeds, strict=True):
-            for agent in members.tolist():
-                self._part_of[agent] = len(parts)
-            context = AgentContext(
-                checked, hierarchy, members, own_seed, messages_fail=bool(failures)
-            )
-            parts.append(own.agents(context))
-            if kept is not None:
-                begin_with(parts[-1], kept, len(parts) - 1)
-        self.parts = tuple(parts)
-        numbered = dict(enumerate(parts))
+        self.parts, self._part_of = build_parts(
+            settings, checked, hierarchy, seed, messages_fail=bool(failures)
+        )
+        numbered = dict(enumerate(self.parts))
         self._senders = {k: p for k, p in numbered.items() if isinstance(p, SendsPayloads)}
-        self._reporting = {k: p for k, p in numbered.items() if isinstance(p, ReportsCosts)}
         self._observing = {k: p for k, p in numbered.items() if isinstance(p, ObservesJointActions)}
-        sent = [MESSAGES] if self._senders else []
-        self.costs = join_costs([*sent, *(m for p in self._reporting.values() for m in p.costs)])
+        self._costs = DecisionCosts(self.parts, counts_messages=bool(self._senders))
+        self.costs = self._costs.measures
         self.decision_costs: Mapping[str, float] = {}
         self._n_received = 0
         self.messages = Messages(
             hierarchy, failures, len(checked.action_set), has_payloads=bool(self._senders)
         )
         self._present = hierarchy
-        self._actions_of_left = _actions_of_left(failures, checked)
-        self.leader = None
-        self._scenario: Scenario = checked
-        self._options = options_of(checked)
-        if self._options is not None:
-            if failures or settings.n_environments > 1:
-                key = "topology.failures" if failures else "learner.environments"
-                raise ValueError(f"{key}: not for agents below a leader, leave out scenario.leader")
-            self.leader = Leader(self._options, seed.spawn(1)[0])
+        neutral = self.action_set.neutral
+        actions = actions_of_left(failures, self.action_set.names, neutral)
+        self._actions_of_left = partial(self.messages.actions_of_left, actions, neutral)
+        self.leader = build_leader(settings, checked, seed, messages_fail=bool(failures))
         self._all = self.parts if self.leader is None else (*self.parts, *self.leader.agents)
 
     @cached_property
     def _stages(self) -> tuple[DecisionStage, ...]:
         # After the repair "next", agents may receive actions from agents of their own stage.
-        is_sequential = any(
-            isinstance(failure, LeftAgents) and failure.repair == "next"
-            for failure in self.messages.failures
-        )
-        acts_in_parallel = [part.acts_in_parallel and not is_sequential for part in self.parts]
+        repairs = [f.repair for f in self.messages.failures if isinstance(f, LeftAgents)]
+        acts_in_parallel = [p.acts_in_parallel and "next" not in repairs for p in self.parts]
         return decision_stages(self.hierarchy, self._part_of, acts_in_parallel)
 
     def only(self, kind: type[A]) -> A:
@@ -179,21 +151,12 @@ class Team:
     @property
     def counts(self) -> Counts:
         """Number of evaluations so far, of the parts that count them."""
-        total = Counts()
-        for part in self._all:
-            if isinstance(part, ReportsResources):
-                total.add(part.counts)
-        return total
+        return counts_of(self._all)
 
     @property
     def weight_bytes(self) -> int:
         """Memory of all learned weights [bytes]."""
-        return sum(
-            part.weight_bytes
-            if isinstance(part, ReportsResources)
-            else sum(array.nbytes for array in part.state_dict().values())
-            for part in self._all
-        )
+        return weight_bytes_of(self._all)
 
     @contextmanager
     def drawing_apart(self) -> Iterator[None]:
@@ -236,12 +199,7 @@ class Team:
             team has one; one line.
         """
         if previous is None:  # an episode begins
-            self._options = options_of(scenario)
-            if (self.leader is None) != (self._options is None):
-                raise ValueError(
-                    "scenario.leader: build the team in a scenario with the same leader"
-                )
-            self._scenario = scenario
+            enter_scenario(self.leader, scenario)
         prediction = prediction_of(scenario) if self.needs_prediction else UNPREDICTED
         return Observation(states, prediction, previous)
 
@@ -291,46 +249,33 @@ class Team:
             self._rearrange()
         if inspect and observation.states.ndim > 2:
             raise ValueError("inspect = True: a decision of one environment only")
-        if self._options is not None and self.leader is not None:
-            led, skilled = self.leader.lead(self._options, observation, explore=explore)
-            if led is not observation:  # an option that begins changes what is predicted
-                if self.needs_prediction:
-                    led = led._replace(prediction=prediction_of(self._scenario))
-                observation = led
+        if self.leader is not None:
+            observation, skilled = self.leader.lead(observation, explore=explore)
             if skilled is not None:
                 self.decision_costs = {measure.name: 0.0 for measure in self.costs}
                 return Decision(skilled, ())
             explore = False
         inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
-        inboxes: list[Inbox] | None = None
+        inboxes: list[Inbox] | None = [] if inspect else None
         if inspect:
-            inboxes = []
-            for part, own in zip(self.parts, inputs, strict=True):
-                if isinstance(part, Inspectable):
-                    part.record_values(own)
+            record_values(self.parts, inputs)
         joint_action = self._decide(observation, inputs, inboxes)
         payloads = self._payloads(inputs) if self._senders else NO_PAYLOADS
         self.messages.advance(joint_action, payloads)
         for k, observing in self._observing.items():
             observing.conclude(inputs[k], joint_action)
         if self.costs:
-            self.decision_costs = self._costs_of_decision(inputs, joint_action)
+            self.decision_costs = self._costs.total(inputs, joint_action, self._n_received)
+            self._n_received = 0
         if inboxes is None:
             return Decision(joint_action, inputs)
-        values: dict[int, FloatArray] = {}
-        for part, own in zip(self.parts, inputs, strict=True):
-            if isinstance(part, Inspectable):
-                values.update(part.action_values(own))
-        agents = inspect_agents(
-            self.hierarchy.agents, self.action_set.names, joint_action, values, inboxes
-        )
+        values = recorded_values(self.parts, inputs)
+        names = self.hierarchy.agents
+        agents = inspect_agents(names, self.action_set.names, joint_action, values, inboxes)
         return Decision(joint_action, inputs, agents)
 
     def _decide(
-        self,
-        observation: Observation,
-        inputs: tuple[object, ...],
-        inboxes: list[Inbox] | None = None,
+        self, observation: Observation, inputs: tuple[object, ...], inboxes: list[Inbox] | None
     ) -> IntArray:
         """Return the joint action, decided stage by stage; append the inboxes to a list."""
         shape = (*observation.states.shape[:-2], len(self.hierarchy))
@@ -339,7 +284,7 @@ class Team:
         fail = bool(self.messages.failures)
         if fail:
             left = self.messages.left
-            joint_action[..., left] = self._joint_action_of_left()[left]
+            joint_action[..., left] = self._actions_of_left()[left]
         for stage in self._stages:
             part = self.parts[stage.part]
             payloads = self._payloads(inputs) if stage.part in self._senders else None
@@ -383,17 +328,13 @@ class Team:
             raise ValueError(f"{type(part).__name__}: has no value function of an agent's states")
         return part.value(index, np.asarray(states, dtype=float))
 
-    def _joint_action_of_left(self) -> IntArray:
-        """Return the actions ``(n,)`` of agents that have left; others are neutral."""
-        return self.messages.actions_of_left(self._actions_of_left, self.action_set.neutral)
-
     def _rearrange(self) -> None:
         """Pass a repaired hierarchy to all parts."""
         self._present = self.messages.hierarchy
         left = np.flatnonzero(self.messages.left)
         for part in self.parts:
             if isinstance(part, Rearrangeable):
-                part.rearrange(self._present, left, self._joint_action_of_left()[left])
+                part.rearrange(self._present, left, self._actions_of_left()[left])
 
     def _payloads(self, inputs: tuple[object, ...]) -> Payloads:
         """Return the payloads of the messages sent so far, by agent."""
@@ -402,22 +343,10 @@ class Team:
             payloads.update(sender.payloads(inputs[k]))
         return payloads
 
-    def _costs_of_decision(
-        self, inputs: tuple[object, ...], joint_action: IntArray
-    ) -> Mapping[str, float]:
-        """Return the costs of a decision by the names of `costs`."""
-        total = {measure.name: 0.0 for measure in self.costs}
-        total[MESSAGES.name] = float(self._n_received)
-        self._n_received = 0
-        for k, part in self._reporting.items():
-            for name, value in part.decision_costs(inputs[k], joint_action).items():
-                total[name] += value
-        return total
-
     def learn(self, experience: Experience) -> None:
         """Learn from a step. Below a leader, only the leader learns."""
-        if self._options is not None and self.leader is not None:
-            self.leader.learn(self._options, experience)
+        if self.leader is not None:
+            self.leader.learn(experience)
             return
         for part, inputs in zip(self.parts, experience.decision.inputs, strict=True):
             part.learn(experience, inputs)
@@ -458,13 +387,7 @@ class Team:
 
     def state_dict(self) -> StateDict:
         """Return the saved state of all parts as named arrays."""
-        if len(self._all) == 1:
-            return self._all[0].state_dict()
-        return {
-            f"part{k}.{name}": array
-            for k, part in enumerate(self._all)
-            for name, array in part.state_dict().items()
-        }
+        return state_of(self._all)
 
     def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
         """Continue from a `state_dict`.
@@ -474,48 +397,4 @@ class Team:
         ValueError
             If it is that of another team.
         """
-        if len(self._all) == 1:
-            self._all[0].load_state_dict(state)
-            return
-        for k, part in enumerate(self._all):
-            part.load_state_dict(select_prefix(f"part{k}.", state))
-
-
-def join_costs(measures: Sequence[Measure]) -> tuple[Measure, ...]:
-    """Return the measures of the costs of all parts, each once.
-
-    Raises
-    ------
-    ValueError
-        If two parts report one cost in different units; one line.
-    """
-    by_name: dict[str, Measure] = {}
-    for measure in measures:
-        known = by_name.setdefault(measure.name, measure)
-        if known != measure:
-            raise ValueError(
-                f"learner.costs.{measure.name} = {measure.unit!r}: another part of the team gives "
-                f"it in {known.unit!r}"
-            )
-    return tuple(by_name.values())
-
-
-def _actions_of_left(failures: Sequence[MessageFailure], scenario: Scenario) -> list[int]:
-    """Return the action of agents that have left, for every failure.
-
-    Raises
-    ------
-    ValueError
-        If an action is unknown; one line.
-    """
-    names = scenario.action_set.names
-    actions = []
-    for k, failure in enumerate(failures):
-        action = failure.action if isinstance(failure, LeftAgents) else None
-        if action is not None and action not in names:
-            raise ValueError(
-                f"topology.failures[{k}].action = {action!r}: unknown action, allowed: "
-                f"{', '.join(names)}"
-            )
-        actions.append(scenario.action_set.neutral if action is None else names.index(action))
-    return actions
+        load_state(self._all, state)

@@ -1,33 +1,22 @@
-"""Evaluators of fuzzy agents for their part of a team."""
+"""Search of fuzzy agents for their part of a team."""
 
 from __future__ import annotations
 
 from ..hierarchy.hierarchy import Hierarchy
+from ..hierarchy.stages import is_fully_communicating
 from ..interface.abilities import PartiallyObserved
-from ..interface.agents import AgentContext
-from ..interface.scenario import Scenario
+from ..interface.agents import AgentContext, Counts
+from ..interface.prediction import Prediction
 from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
 from ..plugins.words import must_inherit
 from ..search.budget import check_budget
-from ..search.evaluator import DecisionProblem, Evaluator, ValueOf, concerned
+from ..search.evaluator import NOBODY, DecisionProblem, Evaluator, ValueOf, concerned
 from ..values.rule_base import RuleBase
 
 
-def is_private(settings: LearnerSettings, scenario: Scenario) -> bool:
-    """Return whether every agent has a view of its own, see `views`."""
-    return settings.decision.errors is not None or isinstance(scenario, PartiallyObserved)
-
-
-def evaluator_of(
-    settings: LearnerSettings,
-    rules: RuleBase,
-    learned: Evaluator | None,
-    context: AgentContext,
-    hierarchy: Hierarchy,
-    left: IntArray,
-) -> Evaluator | None:
-    """Return the evaluator of some agents, or None if they act at random.
+class TeamSearch:
+    """Search of some agents for their actions, also after agents have left the team.
 
     Parameters
     ----------
@@ -36,56 +25,134 @@ def evaluator_of(
     learned
         The learner, if it evaluates actions itself.
     context
-        Where they act.
+        Where the agents act.
+
+    Attributes
+    ----------
+    evaluator
+        Evaluates actions; None if actions are drawn at random.
     hierarchy
         Hierarchy of the agents that are present; agents that have left have no edges.
-    left
-        ``(k,)`` agents that have left.
+    left, actions_of_left
+        ``(k,)`` agents that have left, and their actions, which all agents know.
+    is_private
+        Whether every agent has a view of its own, see `views`.
+    is_joint
+        Whether one search finds the actions of all agents, if the evaluator has one.
 
     Raises
     ------
     ValueError
-        If they decide by values of agents of another part; one line.
+        If the agents decide by values of agents of another part; one line.
     """
-    decision = settings.decision
-    if decision.rule == "random":
-        return None
-    members = context.members.tolist()
-    own = set(members) - set(left.tolist())
-    if decision.rule != "reward" and not context.is_whole:
-        _check_values(hierarchy, set(members), decision.value_of)
-    if learned is not None:
-        n_tried = len(own) * len(context.scenario.action_set)
-        check_budget(decision.budget, n_tried, settings.kind)
-        return learned
-    private = is_private(settings, context.scenario)
-    problem = DecisionProblem(
-        rules=rules,
-        hierarchy=hierarchy,
-        n_actions=len(context.scenario.action_set),
-        groups=context.scenario.groups,
-        rule=decision.rule,
-        teammates=decision.teammates,
-        discount=settings.discount,
-        value_of=decision.value_of,
-        unseen=decision.unseen,
-        plan=decision.plan,
-        handed_down=hierarchy.communication == "ancestors"
-        and not context.messages_fail
-        and not private,
-        members=tuple(i for i in hierarchy.order if i in own) or (members[0],),
-        is_private=private,
-        budget=decision.budget,
-    )
-    evaluator: Evaluator = decision.evaluator.build(problem)
-    must_inherit("learner.decision.evaluator", evaluator, Evaluator)
-    if decision.budget is not None and not evaluator.keeps_budget:
-        raise ValueError(
-            f"learner.decision.budget = {decision.budget}: learner.decision.evaluator = "
-            f"{decision.evaluator.kind!r} cannot keep to a budget; use sampling, best-response or "
-            "exact"
+
+    def __init__(
+        self,
+        settings: LearnerSettings,
+        rules: RuleBase,
+        learned: Evaluator | None,
+        context: AgentContext,
+    ) -> None:
+        self._settings = settings
+        self._rules = rules
+        self._learned = learned
+        self._context = context
+        self._is_checked = False
+        self.hierarchy = context.hierarchy
+        self.left = NOBODY
+        self.actions_of_left = NOBODY
+        is_partial = isinstance(context.scenario, PartiallyObserved)
+        self.is_private = is_partial or settings.decision.errors is not None
+        self.evaluator = self._build()
+        self._evaluators = {self.hierarchy: self.evaluator}
+        self.is_joint = (
+            self.evaluator is not None
+            and type(self.evaluator).decide is not Evaluator.decide
+            and context.is_whole
+            and not self.is_private
+            and not context.messages_fail
+            and is_fully_communicating(self.hierarchy)
         )
-    return evaluator
+
+    def _build(self) -> Evaluator | None:
+        """Return the evaluator for the agents that are present."""
+        decision = self._settings.decision
+        if decision.rule == "random":
+            return None
+        context = self._context
+        members = context.members.tolist()
+        present = set(members) - set(self.left.tolist())
+        n_actions = len(context.scenario.action_set)
+        if decision.rule != "reward" and not context.is_whole:
+            _check_values(self.hierarchy, set(members), decision.value_of)
+        if self._learned is not None:
+            check_budget(decision.budget, len(present) * n_actions, self._settings.kind)
+            return self._learned
+        is_informed = not context.messages_fail and not self.is_private
+        problem = DecisionProblem(
+            rules=self._rules,
+            hierarchy=self.hierarchy,
+            n_actions=n_actions,
+            groups=context.scenario.groups,
+            rule=decision.rule,
+            teammates=decision.teammates,
+            discount=self._settings.discount,
+            value_of=decision.value_of,
+            unseen=decision.unseen,
+            plan=decision.plan,
+            handed_down=is_informed and self.hierarchy.communication == "ancestors",
+            members=tuple(i for i in self.hierarchy.order if i in present) or (members[0],),
+            is_private=self.is_private,
+            budget=decision.budget,
+        )
+        evaluator: Evaluator = decision.evaluator.build(problem)
+        must_inherit("learner.decision.evaluator", evaluator, Evaluator)
+        if decision.budget is not None and not evaluator.keeps_budget:
+            raise ValueError(
+                f"learner.decision.budget = {decision.budget}: learner.decision.evaluator = "
+                f"{decision.evaluator.kind!r} cannot keep to a budget; use sampling, "
+                "best-response or exact"
+            )
+        return evaluator
+
+    @property
+    def counts(self) -> Counts:
+        """Number of evaluations so far."""
+        return Counts() if self.evaluator is None else self.evaluator.counts
+
+    def rearrange(self, hierarchy: Hierarchy, left: IntArray, actions: IntArray) -> None:
+        """Search in a repaired hierarchy, without the agents that have left."""
+        counts = self.counts
+        self.hierarchy = hierarchy
+        self.left = left
+        self.actions_of_left = actions
+        if hierarchy not in self._evaluators:
+            self._evaluators[hierarchy] = self._build()
+        self.evaluator = self._evaluators[hierarchy]
+        if self.evaluator is not None:
+            self.evaluator.counts = counts
+
+    def check(self, prediction: Prediction, neutral: IntArray) -> None:
+        """Refuse a prediction without what the search requires, when first used.
+
+        Raises
+        ------
+        ValueError
+            If rewards or predictions from predicted states are missing; one line.
+        """
+        rule = self._settings.decision.rule
+        if self._is_checked or self.evaluator is None or rule == "value":
+            return
+        if prediction.rewards(neutral[None]) is None:
+            raise ValueError(
+                f"learner.decision.rule = {rule!r}: no rewards are predicted, use value"
+            )
+        if self.evaluator.continues and prediction.after(neutral) is None:
+            raise ValueError(
+                "learner.decision.evaluator: plans of several decisions need a scenario that "
+                "predicts from predicted states"
+            )
+        self._is_checked = True
 
 
 def _check_values(hierarchy: Hierarchy, own: set[int], value_of: ValueOf) -> None:

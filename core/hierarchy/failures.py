@@ -209,3 +209,25 @@ AnyMessageFailure = Annotated[
     Field(discriminator="kind"),
 ]
 """Any message failure, distinguished by `kind`."""
+
+
+def actions_of_left(
+    failures: Sequence[MessageFailure], names: Sequence[str], neutral: int
+) -> list[int]:
+    """Return the action of agents that have left, for every failure.
+
+    Raises
+    ------
+    ValueError
+        If an action is unknown; one line.
+    """
+    actions = []
+    for k, failure in enumerate(failures):
+        action = failure.action if isinstance(failure, LeftAgents) else None
+        if action is not None and action not in names:
+            raise ValueError(
+                f"topology.failures[{k}].action = {action!r}: unknown action, allowed: "
+                f"{', '.join(names)}"
+            )
+        actions.append(neutral if action is None else names.index(action))
+    return actions

@@ -213,14 +213,19 @@ class ReportsResources(Protocol):
 class Inspectable(Protocol):
     """The values by which the agents decide can be shown."""
 
-    def record_values(self, inputs: Any) -> None:
-        """Keep the values of actions in this decision, for `action_values`."""
-
     def action_values(self, inputs: Any) -> Mapping[int, FloatArray]:
-        """Return the recorded values ``(A,)`` of the actions of each member.
+        """Return the values ``(A,)`` of the actions of each member after a decision.
 
         Policies return the log probabilities of actions.
         """
+
+
+@runtime_checkable
+class RecordsValues(Protocol):
+    """Agents keep the values of actions only in a decision that is inspected."""
+
+    def record_values(self, inputs: Any) -> None:
+        """Keep the values of actions in this decision, for `Inspectable.action_values`."""
 
 
 @runtime_checkable

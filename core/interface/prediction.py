@@ -1,4 +1,4 @@
-"""Interface of predictions: next states and rewards of joint actions, and their tables.
+"""Interface of predictions: next states and rewards of joint actions.
 
 Arrays follow the conventions of `spaces`.
 """
@@ -7,51 +7,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from ..numerics import FloatArray, IntArray
-
-
-@dataclass(frozen=True)
-class Blocks:
-    """Next states of one agent for all joint actions: own and shared variables.
-
-    Compiled kernels do not check the sizes of the tables;
-    `nested_agents.scenarios.checking.checker` does.
-    """
-
-    own: FloatArray
-    """``(K, n_own)`` own variables, one row for each robot-action index of the agent's group of
-    ``w`` agents. With `own_rows` there are fewer rows; without own variables one row suffices."""
-    shared: FloatArray
-    """``(R, d - n_own)`` shared variables, one row for each joint-action index, or fewer rows with
-    `shared_rows`."""
-    divisor: int
-    """``A`` to the power of the number of agents after the group. The robot-action index of a
-    joint-action index ``c`` is ``c // divisor % A ** w``."""
-    own_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """``(A ** w,)`` row of `own` for every robot-action index; empty if every index has a row."""
-    shared_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """``(A ** n,)`` row of `shared` for every joint-action index; empty if every index has a
-    row."""
-    alone: bool = False
-    """Whether own variables ignore the other groups, which is an approximation. Otherwise the
-    tables agree exactly with `Prediction.states`."""
-
-    def rows(self, indices: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the rows ``(m,)`` of `own` and of `shared` for joint-action indices ``(m,)``."""
-        local = indices // self.divisor % (len(self.own_rows) or len(self.own))
-        own = self.own_rows[local] if len(self.own_rows) else local
-        return own, self.shared_rows[indices] if len(self.shared_rows) else indices
-
-    def states(self, indices: IntArray) -> FloatArray:
-        """Return the next states ``(m, d)`` of joint-action indices ``(m,)``."""
-        own_rows, shared_rows = self.rows(indices)
-        return np.concatenate([self.own[own_rows], self.shared[shared_rows]], axis=1)
 
 
 class Exploring(NamedTuple):
@@ -70,21 +31,6 @@ NOT_EXPLORING = Exploring(np.zeros(0), -1.0, 1.0)
 """No exploration."""
 
 
-class Tables(ABC):
-    """Next states and rewards of all joint actions, for small numbers of agents."""
-
-    rewarded: bool = True
-    """Whether there is a table of rewards."""
-
-    @abstractmethod
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next states of an agent for all ``A ** n`` joint actions."""
-
-    def reward_table(self) -> FloatArray:
-        """Return the rewards ``(A ** n,)`` of all joint actions, see `Prediction.rewards`."""
-        raise TypeError(f"{type(self).__name__} has no table of rewards")
-
-
 class Prediction(ABC):
     """Next states and rewards of joint actions, valid until the next step of the scenario.
 
@@ -100,7 +46,7 @@ class Prediction(ABC):
     def alike(self) -> IntArray | None:
         """``(G, L)`` first robot-action index with the same result as each index; None if unknown.
 
-        The evaluator ``best-response`` tries only these.
+        The evaluators ``exact`` and ``best-response`` predict only these.
         """
         return None
 
@@ -125,10 +71,6 @@ class Prediction(ABC):
 
         Plans of several decisions require it, and rewards.
         """
-        return None
-
-    def tables(self) -> Tables | None:
-        """Return tables of all joint actions, for the evaluator ``exact``."""
         return None
 
 

@@ -64,17 +64,15 @@ def solver(gram: FloatArray) -> Function:
     return lambda moment: dpotrs(factor, moment, lower)[0]
 
 
-class Earlier(NamedTuple):
-    """After-states of a row from another team."""
+class Outcomes(NamedTuple):
+    """What followed the N after-states of a row."""
 
-    states: FloatArray
-    """``(m, d)``."""
     rewards: FloatArray
-    """``(m,)`` rewards."""
+    """``(N,)`` rewards."""
     follower: IntArray
-    """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
+    """``(N,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
     durations: IntArray
-    """``(m,)`` number of decision periods between an after-state and the next."""
+    """``(N,)`` number of decision periods between an after-state and the next."""
 
 
 class BatchTD(Learner):
@@ -92,28 +90,33 @@ class BatchTD(Learner):
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
                 f"allowed up to {MOST_RULES}; lower learner.rule_base.order"
             )
-        self.settings, self.rules, self._n_agents = settings, rules, len(rows)
-        self.members = [np.flatnonzero(rows == row) for row in range(int(rows.max()) + 1)]
-        """The agents ``(k,)`` of every row."""
-        self.theta: FloatArray = np.zeros((len(self.members), rules.n_rules), rules.dtype)
-        d = len(rules.partitions)
-        nothing = Earlier(np.zeros((0, d)), np.zeros(0), *np.zeros((2, 0), dtype=np.int64))
-        self._earlier = [nothing] * len(self.members)
-        self._states: list[FloatArray] = []
-        self._rewards: list[FloatArray] = []
-        self._follower: list[int] = []
-        self._durations: list[int] = []
+        self.settings = settings
+        self.rules = rules
+        self.rows = rows
+        n_rows = int(rows.max()) + 1
+        self.theta: FloatArray = np.zeros((n_rows, rules.n_rules), rules.dtype)
+        self._counts = np.bincount(rows).tolist()
+        """Number of agents of every row."""
+        # All after-states so far, step by step, in agent order: row, state, reward, index of the
+        # next after-state, and duration of each.
+        self._rows: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+        self._states: list[FloatArray] = [np.zeros((0, len(rules.partitions)))]
+        self._rewards: list[FloatArray] = [np.zeros(0)]
+        self._follower: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+        self._durations: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+        self._n_states = 0
         self._episode_start = 0  # index of the first after-state of the episode
-        # By row, active rules and strengths of the after-states in the last regression.
+        # By row, active rules and strengths of the after-states in the last regression, which
+        # were these many of the arrays above.
         self._active: list[tuple[IntArray, FloatArray]] = []
-        self._regressed = 0
+        self._n_regressed = 0
         # By row, the ridge plus the sum of phi phi', and the number of after-states in it.
         self._summed: dict[int, tuple[FloatArray, int]] = {}
 
     def begin_episode(self) -> None:
         """Begin an episode, even if the last one was interrupted."""
         self._cut_off()
-        self._episode_start = len(self._states)
+        self._episode_start = self._n_states
 
     def observe(
         self,
@@ -123,34 +126,43 @@ class BatchTD(Learner):
         duration: int = 1,
     ) -> int:
         """Store an after-state; regress after every `interval` decisions."""
-        self._durations.append(duration)
+        n = len(states)
+        self._n_states += n
+        follower = np.full(n, TERMINAL) if terminated else self._n_states + np.arange(n)
+        self._rows.append(self.rows)
         self._states.append(states.copy())
-        self._rewards.append(np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)))
-        self._follower.append(TERMINAL if terminated else len(self._states))
-        lasted = len(self._states) - self._episode_start
+        self._rewards.append(np.broadcast_to(np.asarray(reward, dtype=float), (n,)).copy())
+        self._follower.append(follower)
+        self._durations.append(np.full(n, duration))
+        lasted = (self._n_states - self._episode_start) // n
         return 0 if terminated or lasted % self.settings.interval else self._regress()
 
     def end_episode(self) -> int:
         """Regress on all experience."""
         self._cut_off()
-        return self._regress() if self._states else 0
+        return self._regress() if self._n_states else 0
+
+    @property
+    def _is_running(self) -> bool:
+        """Whether the last after-state has no successor yet."""
+        return bool((self._follower[-1] >= self._n_states).any())
 
     def _cut_off(self) -> None:
-        if self._follower and self._follower[-1] == len(self._states):
-            self._follower[-1] = CUT_OFF
+        if self._is_running:
+            self._follower[-1][-len(self.rows) :] = CUT_OFF
 
     def _regress(self) -> int:
         """Update all weights; return their number."""
         self._extend()
         s = self.settings
-        outcomes = self._outcomes()
-        for row, (taken, strengths) in enumerate(self._active):
-            rewards, follower, durations = outcomes[row]
-            rewards = REWARD_SCALE * rewards
+        for row, (outcomes, active) in enumerate(zip(self._outcomes(), self._active, strict=True)):
+            taken, strengths = active
+            follower = outcomes.follower
+            rewards = REWARD_SCALE * outcomes.rewards
             weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
-            paid = rewards, follower, s.discount**durations, weights
+            paid = rewards, follower, s.discount**outcomes.durations, weights
             constants = s.discount, s.trace_decay, low, high
             for _ in range(s.regression_iterations):
                 theta = solve(aim(values_of(theta), paid, constants, taken, strengths, theta.size))
@@ -172,89 +184,86 @@ class BatchTD(Learner):
         k = self.rules.n_rules
         gram, begin = self._summed.get(row, (self.settings.ridge * np.eye(k), 0))
         # The last after-state is added once its successor is known.
-        end = len(known) if known[-1] else len(known) - len(self.members[row])
+        end = len(known) if known[-1] else len(known) - self._counts[row]
         add_gram(gram, active[begin:end], strengths[begin:end], known[begin:end])
         self._summed[row] = gram, end
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
         """Find the active rules of after-states that are new since the last regression."""
-        if self._regressed == len(self._states):
+        if self._n_regressed == len(self._states):
             return
-        rows = range(len(self.theta))
-        active = [self._active_of(self.states_of(row, self._regressed)) for row in rows]
+        states = np.concatenate(self._states[self._n_regressed :])
+        places = self._places(np.concatenate(self._rows[self._n_regressed :]))
+        active = [self._active_of(states[own]) for own in places]
         if self._active:
             active = [
                 (np.concatenate([old[0], new[0]]), np.concatenate([old[1], new[1]]))
                 for old, new in zip(self._active, active, strict=True)
             ]
-        self._active, self._regressed = active, len(self._states)
+        self._active = active
+        self._n_regressed = len(self._states)
+
+    def _places(self, rows: IntArray) -> list[IntArray]:
+        """Return the indices of every row among the rows of after-states."""
+        counts = np.bincount(rows, minlength=len(self.theta))
+        return np.split(np.argsort(rows, kind="stable"), np.cumsum(counts)[:-1])
 
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         return self.rules.active(states)
 
-    def _outcomes(self) -> list[tuple[FloatArray, IntArray, IntArray]]:
-        """Return rewards, successors and durations of all after-states by row, earlier ones first.
-
-        With k agents, after-state ``s * k + j`` is that of agent j after step s.
-        """
-        steps = np.array(self._follower, dtype=np.int64)[:, None]
-        steps[steps == len(steps)] = CUT_OFF  # the episode continues
-        paid = np.array(self._rewards).reshape(-1, self._n_agents)
+    def _outcomes(self) -> list[Outcomes]:
+        """Return the outcomes of all after-states by row."""
+        rewards = np.concatenate(self._rewards)
+        durations = np.concatenate(self._durations)
+        follower = np.concatenate(self._follower)
+        follower[follower >= self._n_states] = CUT_OFF  # the episode continues
+        place = np.empty(self._n_states, dtype=np.int64)
         outcomes = []
-        for earlier, members in zip(self._earlier, self.members, strict=True):
-            k, before = len(members), len(earlier.states)
-            follower = np.where(steps < 0, steps, before + steps * k + np.arange(k)).ravel()
-            rewards = np.append(earlier.rewards, paid[:, members].ravel())
-            durations = np.append(earlier.durations, np.repeat(self._durations, k))
-            outcomes.append((rewards, np.append(earlier.follower, follower), durations))
+        for own in self._places(np.concatenate(self._rows)):
+            place[own] = np.arange(len(own))
+            after = follower[own]
+            after = np.where(after < 0, after, place[after])
+            outcomes.append(Outcomes(rewards[own], after, durations[own]))
         return outcomes
 
-    def states_of(self, row: int, since: int = 0) -> FloatArray:
-        """Return the after-states ``(m, d)`` of a row, or those of this team since a step."""
-        d = len(self.rules.partitions)
-        new = np.array(self._states[since:]).reshape(-1, self._n_agents, d)
-        own = new[:, self.members[row]].reshape(-1, d)
-        return own if since else np.concatenate([self._earlier[row].states, own])
+    def states_of(self, row: int) -> FloatArray:
+        """Return the after-states ``(m, d)`` of a row."""
+        return np.concatenate(self._states)[np.concatenate(self._rows) == row]
 
     def state_dict(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
-        n, d = self._n_agents, len(self.rules.partitions)
-        held = [len(earlier.states) for earlier in self._earlier]
         return {
             "theta": self.theta,
-            "states": np.array(self._states).reshape(-1, n, d),
-            "rewards": np.array(self._rewards).reshape(-1, n),
-            "follower": np.array(self._follower, dtype=np.int64),
-            "durations": np.array(self._durations, dtype=np.int64),
-            "earlier_rows": np.repeat(np.arange(len(held)), held),
-            "earlier_states": np.concatenate([e.states for e in self._earlier]),
-            "earlier_rewards": np.concatenate([e.rewards for e in self._earlier]),
-            "earlier_follower": np.concatenate([e.follower for e in self._earlier]),
-            "earlier_durations": np.concatenate([e.durations for e in self._earlier]),
+            "rows": np.concatenate(self._rows),
+            "states": np.concatenate(self._states),
+            "rewards": np.concatenate(self._rewards),
+            "follower": np.concatenate(self._follower),
+            "durations": np.concatenate(self._durations),
         }
 
     def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
         """Continue from a `state_dict`."""
         self.theta = state["theta"].copy()
-        self._states = list(state["states"])
-        self._rewards = list(state["rewards"])
-        self._follower = [int(f) for f in state["follower"]]
-        self._durations = [int(k) for k in state["durations"]]
-        ended = [s for s, f in enumerate(self._follower) if f in (TERMINAL, CUT_OFF)]
-        self._episode_start = ended[-1] + 1 if ended else 0
-        rows = state["earlier_rows"]
-        self._earlier = [
-            Earlier(*(state[f"earlier_{name}"][rows == row] for name in Earlier._fields))
-            for row in range(len(self.theta))
-        ]
-        self._active, self._regressed, self._summed = [], 0, {}
+        self._rows = [state["rows"].astype(np.int64)]
+        self._states = [state["states"].copy()]
+        self._rewards = [state["rewards"].astype(float)]
+        self._follower = [state["follower"].astype(np.int64)]
+        self._durations = [state["durations"].astype(np.int64)]
+        self._n_states = len(state["states"])
+        self._episode_start = 1 + int(np.append(-1, np.flatnonzero(self._follower[0] < 0)).max())
+        self._active = []
+        self._n_regressed = 0
+        self._summed = {}
 
     def warm_start(self, former: Self, rows: IntArray) -> None:
         """Start from weights and experience of another team, between its episodes."""
+        state = former.state_dict()
+        renamed = np.empty_like(rows)
+        renamed[rows] = np.arange(len(rows))
+        BatchTD.load_state_dict(self, state)
         self.theta = former.theta[rows]
-        outcomes = former._outcomes()
-        self._earlier = [Earlier(former.states_of(row), *outcomes[row]) for row in rows]
+        self._rows = [renamed[self._rows[0]]]
 
 
 @njit(cache=True)

@@ -33,7 +33,7 @@ from ..search.exploration import EXPLORATIONS, BurstExploration, ExplorationSett
 from ..search.settings import DecisionSettings
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
-from .batch import BatchTD, Earlier, Function, add_gram, row_values, solver
+from .batch import BatchTD, Function, add_gram, row_values, solver
 from .learner import LearnerSettings
 
 NOBODY = "nobody"
@@ -185,8 +185,7 @@ class FittedQ(BatchTD, Evaluator):
         Old sums are reduced by `forgetting`, then new decisions are added. The last decision of a
         running episode is added later, because its outcome is unknown.
         """
-        is_running = self._follower[-1] == len(self._states)
-        begin, end = len(self._weights[row]), len(known) - is_running * len(self.members[row])
+        begin, end = len(self._weights[row]), len(known) - self._is_running * self._counts[row]
         kept, new = 1.0 - self.settings.forgetting, slice(begin, end)
         taken, strengths = self._active[row][0][new], self._active[row][1][new]
         self._gram[row] *= kept
@@ -228,17 +227,13 @@ class FittedQ(BatchTD, Evaluator):
             self._gram = former._gram[rows]
             return
         self.theta = carried_weights(former.rules, self.rules, self.theta)
-        self._earlier = [
-            earlier._replace(states=self._with_told(earlier)) for earlier in self._earlier
-        ]
-        for row, earlier in enumerate(self._earlier):
-            held = len(self._weights[row])
-            taken, strengths = self._active_of(earlier.states[:held])
-            self._add(row, taken, strengths, self._weights[row])
+        self._states = [self._with_told(states) for states in self._states]
+        for row, weights in enumerate(self._weights):
+            taken, strengths = self._active_of(self.states_of(row)[: len(weights)])
+            self._add(row, taken, strengths, weights)
 
-    def _with_told(self, earlier: Earlier) -> FloatArray:
+    def _with_told(self, states: FloatArray) -> FloatArray:
         """Return earlier decisions with this team's number of messages; mark missing senders."""
-        states = earlier.states
         missing = max(len(self.rules.partitions) - states.shape[1], 0)
         known = states[:, : len(self.rules.partitions) - 1 - missing]
         nobody = np.full((len(states), missing), float(self._n_actions))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..interface.prediction import Blocks, Prediction, Tables, first_alike
+from ..interface.prediction import Prediction, first_alike
 from ..numerics import FloatArray, IntArray
 
 
@@ -33,12 +33,12 @@ class LearnedPrediction(Prediction):
         self._first: IntArray | None = None
         n, a, _ = self._reached.shape
         same = (self._reached[:, :, None] == self._reached[:, None]).all(axis=3)
-        self._level = same.argmax(axis=2) if predictor.own_rules else np.tile(np.arange(a), (n, 1))
-        if predictor.digits.size:
+        level = same.argmax(axis=2) if predictor.own_rules else np.tile(np.arange(a), (n, 1))
+        joint_actions = predictor.joint_actions
+        if joint_actions is not None:
             groups = np.array(predictor.groups)
-            digits = predictor.digits
-            places = a ** np.arange(digits.shape[1])[::-1]
-            self._first = first_alike(self._level[groups[:, None], digits[None]] @ places)
+            places = a ** np.arange(joint_actions.shape[1])[::-1]
+            self._first = first_alike(level[groups[:, None], joint_actions[None]] @ places)
 
     @cached_property
     def alike(self) -> IntArray | None:
@@ -59,34 +59,3 @@ class LearnedPrediction(Prediction):
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         own, shared = self.states_by_group(joint_actions)
         return np.concatenate([own[agent], shared[self._predictor.group_of[agent]]], axis=1)
-
-
-class TabulatedPrediction(LearnedPrediction, Tables):
-    """A learned prediction of few agents, with tables of all joint actions."""
-
-    @cached_property
-    def _table(self) -> tuple[FloatArray, IntArray]:
-        """Shared variables ``(G, rows, s)``, and the row of every joint-action index."""
-        p = self._predictor
-        assert self._first is not None  # tables are of groups of equal size
-        same = self._first[np.arange(len(p.groups)), p.local] @ p.divisors
-        first, row = np.unique(same, return_index=True, return_inverse=True)[1:]
-        return self.states_by_group(p.joint[first])[1], row
-
-    rewarded = False
-
-    def tables(self) -> Tables:
-        """Return itself: it has tables of all joint actions."""
-        return self
-
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next states of `agent` for all joint actions."""
-        p = self._predictor
-        shared, row = self._table
-        g = p.group_of[agent]
-        own_rows = self._level[agent][p.digits[:, p.groups[g].index(agent)]]
-        own = self._reached[agent]
-        if not own.shape[1]:
-            own = own[:1]
-            own_rows = own_rows[:0]
-        return Blocks(own, shared[g], int(p.divisors[g]), own_rows, row)

@@ -9,14 +9,11 @@ of the drivers on all other variables is regressed on the rules of a fuzzy rule 
 Angles always use changes.
 
 Bodies of one kind share weights: one set for the effect on itself, one for the effect on others.
-Both are ridge regressions (Hoerl and Kennard 1970) on sums over all experience, so that memory and
-time do not grow. Predictions stay within the observed range. Over several decisions, the first
-joint action is held.
+Both are ridge regressions on sums over all experience. Predictions stay within the observed range.
+Over several decisions, the first joint action is held.
 """
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -25,16 +22,13 @@ from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
-from .adaptive import Adaptive, DynamicsModel
-from .learned_prediction import LearnedPrediction, TabulatedPrediction
+from .adaptive import DynamicsModel
+from .learned_prediction import LearnedPrediction
 from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states
+from .regression import INTERVAL, RegressionModel, solve_ridge
 
-INTERVAL = 100
-"""Number of decisions between regressions within an episode."""
 MAX_FEATURES = 4096
 """Maximum number of features of a regression that is solved densely."""
-MAX_TABULATED = 4**6
-"""Maximum number of joint actions of which predictions have tables."""
 OWN_RIDGE = 1e-6
 """Ridge of own variables, small since they are observed without noise."""
 MIDPOINT_ITERATIONS = 3
@@ -43,7 +37,7 @@ GRAIN = 1e-3
 """Own variables are rounded to this share of their range, so that equal outcomes are found."""
 
 
-class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
+class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
     """Learns the outcome of actions by regression; see the module.
 
     Parameters
@@ -93,7 +87,13 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         self.limits = np.maximum(np.abs(low), np.abs(high))[: space.n_own]
         self.grains = GRAIN * (high - low)[: space.n_own]
         self._pending: list[tuple[FloatArray, IntArray, FloatArray]] = []
-        self._tabulate()
+        sizes = [len(group) for group in self.groups]
+        self.group_of = np.repeat(np.arange(len(self.groups)), sizes)
+        self.joint_actions: IntArray | None = None
+        """``(A ** w, w)`` joint actions of a group, if all groups have w agents."""
+        if len({*sizes}) == 1:
+            shape = (self.n_actions,) * sizes[0]
+            self.joint_actions = np.indices(shape).reshape(sizes[0], -1).T
         b, w = self.bodies.members.shape
         v = len(self.bodies.common)
         k = w * (space.n_own or self.n_actions + 1)
@@ -106,7 +106,7 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         r = self.own_rules.n_rules if self.own_rules else 0
         of_own = (self.kinds.max() + 1, self.n_actions, r)
         f = k * rules
-        self.memory: dict[str, FloatArray] = {
+        self.memory = {
             "own_gram": np.zeros((*of_own, r)),
             "own_moment": np.zeros((*of_own, space.n_own)),
             "own_weights": np.zeros((*of_own, space.n_own)),
@@ -117,27 +117,10 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
             "keep": np.ones(v),
             "seen": np.where(self.periods > 0.0, [low, high], [[np.inf], [-np.inf]]),
         }
-        """Sums over all experience, and the weights computed from them."""
-
-    def _tabulate(self) -> None:
-        """Tabulate the joint actions of a group, and of all agents if there are few."""
-        a = self.n_actions
-        n = len(self.kinds)
-        sizes = {len(group) for group in self.groups}
-        self.group_of = np.repeat(np.arange(len(self.groups)), [len(g) for g in self.groups])
-        self.digits = self.joint = np.zeros((0, 0), dtype=np.int64)
-        """``(A ** w, w)`` if groups are of equal size; ``(A ** n, n)`` if agents are few, too."""
-        if len(sizes) == 1:
-            (w,) = sizes
-            self.digits = np.indices((a,) * w).reshape(w, -1).T
-            if a**n <= MAX_TABULATED:
-                self.joint = np.indices((a,) * n).reshape(n, -1).T
-                self.divisors = a ** np.arange(n - w, -1, -w)
-                self.local = np.arange(a**n)[:, None] // self.divisors % a**w
 
     def predict(self, states: FloatArray) -> LearnedPrediction:
         """Predict from states ``(n, d)``."""
-        return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
+        return LearnedPrediction(self, states)
 
     def adapt(
         self, prediction: LearnedPrediction, joint_action: IntArray, transition: Transition
@@ -236,11 +219,8 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
 
     def _ridge(self, gram: FloatArray, moment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the weights of a ridge regression, and the sum of squares that they explain."""
-        from scipy.linalg import cho_factor, cho_solve
-
         ridge = self.settings.ridge
-        regular = gram + ridge * np.eye(len(gram))
-        weights = cho_solve(cho_factor(regular, overwrite_a=True, check_finite=False), moment)
+        weights = solve_ridge(gram, moment, ridge)
         return weights, (weights * moment).sum(axis=0) + ridge * (weights**2).sum(axis=0)
 
     def group_drivers(self, own: FloatArray, joint_actions: IntArray) -> FloatArray:
@@ -291,14 +271,6 @@ class LearnedPredictor(DynamicsModel, Adaptive[LearnedPrediction]):
         )
         body, place = bodies.places
         return np.ascontiguousarray(np.moveaxis(moved[:, body, place], 0, 1))
-
-    def state_dict(self) -> dict[str, FloatArray]:
-        """Return sums over all experience, and the weights computed from them."""
-        return self.memory
-
-    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
-        """Continue from a `state_dict`."""
-        self.memory = {name: np.array(state[name]) for name in self.memory}
 
     def warm_start(self, former: LearnedPredictor) -> None:
         """Start from another predictor if its bodies have the same variables."""

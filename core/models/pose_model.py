@@ -7,20 +7,17 @@ regression (Hoerl and Kennard 1970) on sums over all experience.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..interface.abilities import Embodiment
 from ..interface.prediction import EmbodiedPrediction
 from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
-from .adaptive import Adaptive
-from .learned_predictor import INTERVAL
 from .predictors import PosePredictorSettings
+from .regression import INTERVAL, RegressionModel, solve_ridge
 
 
-class PoseModel(Adaptive[EmbodiedPrediction]):
+class PoseModel(RegressionModel[EmbodiedPrediction]):
     """Weights with which bodies predict their poses, see `Assumptions.regressions`.
 
     Parameters
@@ -45,8 +42,7 @@ class PoseModel(Adaptive[EmbodiedPrediction]):
         self.horizon = settings.horizon
         self._ridge = settings.ridge
         self._levers = scenario.levers
-        self.memory: dict[str, FloatArray] = {"decisions": np.zeros(1)}
-        """Sums over all experience, and the weights computed from them."""
+        self.memory = {"decisions": np.zeros(1)}
         for i, (f, t) in enumerate(scenario.regression_shapes):
             self.memory[f"gram{i}"] = np.zeros((f, f))
             self.memory[f"moment{i}"] = np.zeros((f, t))
@@ -72,17 +68,8 @@ class PoseModel(Adaptive[EmbodiedPrediction]):
     def end_episode(self) -> None:
         """Regress on all experience."""
         for i in range(len(self.weights)):
-            gram = self.memory[f"gram{i}"]
-            regular = gram + self._ridge * np.eye(len(gram))
-            self.memory[f"weights{i}"] = np.linalg.solve(regular, self.memory[f"moment{i}"])
-
-    def state_dict(self) -> dict[str, FloatArray]:
-        """Return sums over all experience, and the weights computed from them."""
-        return self.memory
-
-    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
-        """Continue from a `state_dict`."""
-        self.memory = {name: np.array(state[name]) for name in self.memory}
+            sums = self.memory[f"gram{i}"], self.memory[f"moment{i}"]
+            self.memory[f"weights{i}"] = solve_ridge(*sums, self._ridge)
 
     def warm_start(self, former: PoseModel) -> None:
         """Start from another model if it describes the same bodies."""

@@ -191,9 +191,6 @@ class PPOAgents(Agents[PolicyInputs]):
         chosen: IntArray = (logits + inputs.noise[:, inbox.agents]).argmax(axis=2)
         return chosen.reshape(*inputs.batch_shape, -1)
 
-    def record_values(self, inputs: PolicyInputs) -> None:
-        """Do nothing, because inputs always contain the logits."""
-
     def action_values(self, inputs: PolicyInputs) -> Mapping[int, FloatArray]:
         """Return the log probabilities ``(A,)`` of the actions of each member."""
         log_probs = inputs.logits[0] - log_sum_exp(inputs.logits[0])[:, None]

@@ -4,12 +4,13 @@
 many agents, best responses around a plan reach greater values than a sample in half of its time.
 """
 
+from functools import cached_property
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ..interface.prediction import Tables
+from ..interface.prediction import Prediction, rewards_of, states_by_group
 from ..numerics import FloatArray, IntArray
 from .evaluator import (
     EVALUATORS,
@@ -18,6 +19,7 @@ from .evaluator import (
     DecisionProblem,
     Evaluator,
     EvaluatorSettings,
+    Learned,
 )
 
 MAX_JOINT_ACTIONS = 4**11
@@ -59,13 +61,74 @@ def exact_joint_actions(problem: DecisionProblem) -> int:
     return sum(problem.n_actions ** (1 + k) for k in below)
 
 
+class _JointOutcomes:
+    """Predicted outcomes of all joint actions. Equivalent actions are predicted once.
+
+    Parameters
+    ----------
+    problem
+        Properties that all decisions of the team share.
+    prediction
+        Prediction of the decision.
+    joint_actions
+        ``(A ** n, n)`` all joint actions, in the order of their index.
+
+    Attributes
+    ----------
+    distinct
+        ``(m, n)`` joint actions without equivalent ones.
+    rows
+        ``(A ** n,)`` the distinct joint action that each joint action is equivalent to.
+    values
+        Mean values ``(m,)`` of several agents, and their weights; None before they are computed.
+    """
+
+    def __init__(
+        self, problem: DecisionProblem, prediction: Prediction, joint_actions: IntArray
+    ) -> None:
+        self.problem = problem
+        self.prediction = prediction
+        self.distinct = joint_actions
+        self.rows = np.arange(len(joint_actions))
+        self.values: tuple[Learned, FloatArray] | None = None
+        alike = prediction.alike
+        if alike is not None:
+            rows = np.zeros(1, dtype=np.int64)
+            n_rows = 1
+            for group, equivalent in zip(problem.groups, alike, strict=True):
+                first = equivalent[: problem.n_actions ** len(group)]
+                number = (first == self.rows[: len(first)]).cumsum() - 1
+                count = int(number[-1]) + 1
+                rows = np.add.outer(rows * count, number[first]).ravel()
+                n_rows *= count
+            firsts = np.empty(n_rows, dtype=np.int64)
+            firsts[rows[::-1]] = self.rows[::-1]
+            self.rows = rows
+            self.distinct = joint_actions[firsts]
+
+    @cached_property
+    def rewards(self) -> FloatArray:
+        """Predicted rewards ``(m,)``."""
+        return rewards_of(self.prediction, self.distinct)
+
+    @cached_property
+    def states(self) -> list[FloatArray]:
+        """By agent, predicted states ``(m, d)``."""
+        groups = self.problem.groups
+        n_own = self.problem.rules.n_own
+        own, shared = states_by_group(self.prediction, self.distinct, groups, n_own)
+        return [
+            np.concatenate([own[agent], of_group], axis=1)
+            for group, of_group in zip(groups, shared, strict=True)
+            for agent in group
+        ]
+
+
 class ExactEnumeration(Aggregation):
     """Evaluates every joint action of an agent and those below it, as in the paper.
 
-    An agent tries ``A ** (1 + len(below))`` joint actions.
-
-    Next states come from tables of all joint actions, if the prediction has such tables and all
-    agents together evaluate at least that many joint actions.
+    An agent tries ``A ** (1 + len(below))`` joint actions. If all agents together try at least as
+    many as there are, all joint actions are predicted at once.
 
     Raises
     ------
@@ -81,21 +144,23 @@ class ExactEnumeration(Aggregation):
         n, a = len(self.hierarchy), self.n_actions
         self.check_budget(exact_joint_actions(problem))
         self._below = [combinations(self.hierarchy.searched(i), a) for i in range(n)]
-        self._offsets: list[IntArray] = []
-        """For each agent, contributions of its own and lower actions to the joint-action index."""
-        self._given_strides: list[IntArray] = []
-        """For each agent, index strides ``(n,)`` of the actions of all others, else 0."""
-        self._means: tuple[tuple[object, ...], FloatArray] | None = None
-        self._uses_tables = self.hierarchy.count_joint_actions(a) >= a**n
-        if self._uses_tables:
+        self._every: IntArray | None = None
+        """``(A ** n, n)`` all joint actions, if all are predicted at once."""
+        self._indices: list[IntArray] = []
+        """By agent, contributions of its own and lower actions to the joint-action index."""
+        self._strides: list[IntArray] = []
+        """By agent, index strides ``(n,)`` of the actions of all others, else 0."""
+        self._last: _JointOutcomes | None = None
+        if a**n <= min(self.hierarchy.count_joint_actions(a), MAX_JOINT_ACTIONS):
+            self._every = combinations(tuple(range(n)), a)
             strides = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
             for agent in range(n):
                 below = list(self.hierarchy.searched(agent))
                 own = np.arange(a)[:, None] * strides[agent]
-                self._offsets.append((own + self._below[agent] @ strides[below]).ravel())
-                given = strides.copy()
-                given[[agent, *below]] = 0
-                self._given_strides.append(given)
+                self._indices.append((own + self._below[agent] @ strides[below]).ravel())
+                others = strides.copy()
+                others[[agent, *below]] = 0
+                self._strides.append(others)
 
     def values(self, context: DecisionContext) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -109,40 +174,39 @@ class ExactEnumeration(Aggregation):
         return self.aggregate(context, self._below[agent], probabilities)
 
     def worths(self, context: DecisionContext, tried: IntArray) -> FloatArray:
-        """Return values ``(A, m)``, from tables of all joint actions if the prediction has them."""
-        tables = context.prediction.tables() if self._uses_tables else None
-        if tables is None or (self.problem.rule != "value" and not tables.rewarded):
+        """Return values ``(A, m)`` of own actions, each with joint actions `tried` ``(m, k)``."""
+        if self._every is None:
             return super().worths(context, tried)
+        if self._last is None or self._last.prediction is not context.prediction:
+            self._last = _JointOutcomes(self.problem, context.prediction, self._every)
+        outcomes = self._last
         agent = context.agent
-        given = int(context.joint_action @ self._given_strides[agent])
-        indices = self._offsets[agent] + given
+        given = int(context.joint_action @ self._strides[agent])
+        indices = self._indices[agent] + given
         self.count(agent, len(indices))
+        rows = outcomes.rows[indices]
         worth = self.combine(
-            lambda: tables.reward_table()[indices],
-            lambda: self._table_values(context, tables, indices),
+            lambda: outcomes.rewards[rows], lambda: self._values_of(context, outcomes, rows)
         )
         return worth.reshape(self.n_actions, -1)
 
-    def _table_values(
-        self, context: DecisionContext, tables: Tables, indices: IntArray
+    def _values_of(
+        self, context: DecisionContext, outcomes: _JointOutcomes, rows: IntArray
     ) -> FloatArray:
-        """Return the values ``(m,)`` of joint-action indices ``(m,)`` to the deciding agent.
+        """Return the values ``(k,)`` of rows ``(k,)`` of the outcomes to the deciding agent.
 
-        The mean over several agents is computed for all joint actions, once in a decision.
+        The mean over several agents is computed for all outcomes, once in a decision.
         """
-        weights = context.weights
-        concerned = self.concerned[context.agent]
-        if len(concerned) == 1:
-            blocks = tables.blocks(context.agent)
-            return self.rules.block_values(context.own_weights, blocks, indices)
-        key = tables, weights, concerned
-        if self._means is None or any(a is not b for a, b in zip(self._means[0], key, strict=True)):
-            every = np.arange(self.n_actions ** len(weights))
-            values = [
-                self.rules.block_values(weights[i], tables.blocks(i), every) for i in concerned
-            ]
-            self._means = key, np.add.reduce(values) / len(values)
-        return self._means[1][indices]
+        learned = self.learned(context)
+        if len(learned.agents) > 1:
+            if outcomes.values is None or outcomes.values[0] is not learned:
+                values = self.mean(learned.pooled, outcomes.prediction, outcomes.distinct)
+                outcomes.values = learned, values
+            return outcomes.values[1][rows]
+        states = outcomes.states[context.agent]
+        if len(rows) > len(states):
+            return self.rules.values(context.own_weights, states)[rows]
+        return self.rules.values(context.own_weights, states[rows])
 
 
 class SamplingSettings(EvaluatorSettings):

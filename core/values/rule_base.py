@@ -23,13 +23,12 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
 from ..plugins.words import closest
 from .partitions import Partition
-from .triangular import active_rules, layout, summed_values, values_of_agents, values_of_tables
+from .triangular import active_rules, layout, summed_values, values_of_agents
 
 
 class RuleBaseSettings(Settings):
@@ -298,26 +297,6 @@ class RuleBase:
         rules, strengths = self.active(states)
         np.add.at(target, (rows[:, None], rules), weights[:, None] * strengths)
 
-    def block_values(self, theta: FloatArray, blocks: Blocks, indices: IntArray) -> FloatArray:
-        """Return values ``(m,)`` of the next states that joint-action indices ``(m,)`` lead to.
-
-        The kernels trust the blocks; `nested_agents.scenarios.checking.checker` checks them.
-
-        Raises
-        ------
-        ValueError
-            If theta is not ``(n_rules,)``.
-        """
-        self._check_theta(theta)
-        own_rows, shared_rows = blocks.rows(indices)
-        if self.is_triangular:
-            tables = blocks.own, own_rows, blocks.shared, shared_rows
-            return values_of_tables(theta, tables, len(indices), self.layout)
-        own_rows, own_inverse = np.unique(own_rows, return_inverse=True)
-        shared_rows, shared_inverse = np.unique(shared_rows, return_inverse=True)
-        table = self._dense_table(theta, blocks.own[own_rows], blocks.shared[shared_rows])
-        return table[own_inverse, shared_inverse]
-
     def _dense_values(self, theta: FloatArray, states: FloatArray) -> FloatArray:
         """Return values ``(m,)`` of states ``(m, d)`` where every rule is active.
 
@@ -330,18 +309,6 @@ class RuleBase:
             heads = _products([strengths[j] for j in term[:half]], len(states))
             tails = _products([strengths[j] for j in term[half:]], len(states))
             values += ((heads @ weights.reshape(heads.shape[1], -1)) * tails).sum(axis=1)
-        return values
-
-    def _dense_table(self, theta: FloatArray, own: FloatArray, shared: FloatArray) -> FloatArray:
-        """Return values ``(K, R)`` of every pair of K own and R shared blocks."""
-        k, r = len(own), len(shared)
-        columns = [*own.T, *shared.T]
-        strengths = [p.strengths(x) for p, x in zip(self.partitions, columns, strict=True)]
-        values: FloatArray = np.zeros((k, r))
-        for term, weights in zip(self.terms, self._split(theta), strict=True):
-            heads = _products([strengths[j] for j in term if j < self.n_own], k)
-            tails = _products([strengths[j] for j in term if j >= self.n_own], r)
-            values += (heads @ weights.reshape(heads.shape[1], -1)) @ tails.T
         return values
 
     def _split(self, theta: FloatArray) -> list[FloatArray]:

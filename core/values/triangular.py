@@ -21,12 +21,6 @@ second `OFFSET`, `LENGTH` and, from `FIRST` on, the variables. Passing few array
 COUNT, PERIOD, LOW, KNOTS = range(4)
 OFFSET, LENGTH, FIRST = range(3)
 
-StateTables: TypeAlias = tuple[FloatArray, IntArray, FloatArray, IntArray]
-"""States by their own and their shared variables.
-
-``(K, n_own)`` own variables, ``(m,)`` the row of each state in them, ``(R, d - n_own)`` shared
-variables and ``(m,)`` the row in them. Where rows are empty, state number s has row s."""
-
 
 def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]]) -> Layout:
     """Return partitions and terms as arrays for the kernels."""
@@ -98,13 +92,17 @@ def _corners(
 
 @njit(cache=True)
 def _add_values(
-    theta: FloatArray, terms: IntArray, tables: StateTables, variables: FloatArray, out: FloatArray
+    theta: FloatArray,
+    terms: IntArray,
+    own: FloatArray,
+    shared: FloatArray,
+    variables: FloatArray,
+    out: FloatArray,
 ) -> None:
     """Add the value of some terms in m states to ``out`` ``(m,)``.
 
-    Arrays are taken out of tuples before the loops, which is faster.
+    The states are their own variables ``(m, n_own)`` and their shared ones ``(m, d - n_own)``.
     """
-    own, own_rows, shared, shared_rows = tables
     d = len(variables)
     n_own = own.shape[1]
     lowers = np.empty(d, np.int64)
@@ -113,10 +111,8 @@ def _add_values(
     rules = np.empty(2 ** terms[:, LENGTH].max(), np.int64)
     strengths = np.empty(len(rules))
     for s in range(len(out)):
-        own_row = own_rows[s] if len(own_rows) else s
-        shared_row = shared_rows[s] if len(shared_rows) else s
         for j in range(d):
-            x = own[own_row, j] if j < n_own else shared[shared_row, j - n_own]
+            x = own[s, j] if j < n_own else shared[s, j - n_own]
             lowers[j], uppers[j], degrees[j] = _neighbors(j, x, variables)
         value = 0.0
         for t in range(len(terms)):
@@ -137,19 +133,8 @@ def values_of_agents(theta: FloatArray, states: FloatArray, layout: Layout) -> F
     """Return values ``(n, s)`` of states ``(n, s, d)`` by the rows of theta ``(n, n_rules)``."""
     variables, terms = layout
     out = np.zeros(states.shape[:2])
-    every = np.empty(0, np.int64)
     for i in range(len(states)):
-        _add_values(theta[i], terms, (states[i], every, states[i], every), variables, out[i])
-    return out
-
-
-@njit(cache=True)
-def values_of_tables(
-    theta: FloatArray, tables: StateTables, n_states: int, layout: Layout
-) -> FloatArray:
-    """Return the values ``(n_states,)`` of the states in `tables` by weights ``(n_rules,)``."""
-    out = np.zeros(n_states)
-    _add_values(theta, layout[1], tables, layout[0], out)
+        _add_values(theta[i], terms, states[i], states[i, :, :0], variables, out[i])
     return out
 
 
@@ -282,14 +267,12 @@ def summed_values(
     own_terms = own_terms[own_terms[:, LENGTH] > 1]
     body_terms = body_terms[body_terms[:, LENGTH] > 1]
     common_terms = common_terms[common_terms[:, LENGTH] > 1]
-    every = np.empty(0, np.int64)
     for b in range(len(shared)):
         if len(own_terms):
             for i in range(firsts[b], firsts[b + 1]):
-                tables = (own[agents[i]], every, shared[b], every)
-                _add_values(of_agents[i], own_terms, tables, variables, out)
+                _add_values(of_agents[i], own_terms, own[agents[i]], shared[b], variables, out)
         if len(body_terms):
-            _add_values(of_bodies[b], body_terms, (own[0], every, shared[b], every), variables, out)
+            _add_values(of_bodies[b], body_terms, own[0], shared[b], variables, out)
     if len(common_terms):
-        _add_values(of_all[0], common_terms, (own[0], every, shared[0], every), variables, out)
+        _add_values(of_all[0], common_terms, own[0], shared[0], variables, out)
     return out

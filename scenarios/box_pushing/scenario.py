@@ -356,14 +356,9 @@ class BoxPushing(Scenario):
         """
         shared = self.space.shared(batch, range(len(self.groups))).swapaxes(0, 1)
         m, n_robots, _ = shared.shape
-        n_own = self.state_space.n_own
-        poses = batch.robots.transpose(2, 0, 1)
-        if self.space.own_needs_pose:
-            poses = poses[:, self.body]
         states = np.empty((m, n_robots, len(self.groups[0]), self.state_space.n_variables))
-        own = self.space.own(poses.reshape(-1, 3), speeds.reshape(-1), self.aim)
-        states[..., :n_own] = own.reshape(*states.shape[:3], -1)
-        states[..., n_own:] = shared[:, :, None]
+        states[..., 0] = speeds.reshape(states.shape[:3])
+        states[..., 1:] = shared[:, :, None]
         return states.reshape(*speeds.shape, -1)
 
 

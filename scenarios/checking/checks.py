@@ -16,7 +16,7 @@ from ...core.interface.measures import Measure
 from ...core.interface.prediction import Prediction
 from ...core.interface.scenario import Scenario, checked_scenario
 from .episodes import CheckPlan, StepRecord, bits, differences, start, transition_fields, when
-from .predictions import faults_of_prediction, faults_of_sharing, too_many_joint_actions
+from .predictions import faults_of_prediction, faults_of_sharing
 from .sensing import faults_of_sensing, predicted_steps
 
 STEPS = 5
@@ -166,7 +166,7 @@ def check_predicting_changes_nothing(plan: CheckPlan) -> Iterator[str]:
 
 
 def check_predictions(plan: CheckPlan) -> Iterator[str]:
-    """Check shapes and values of predictions and their tables."""
+    """Check shapes and values of predictions."""
     scenario = plan.make()
     rng = np.random.default_rng(plan.seeds[0])
     if scenario.lacks_prediction:
@@ -177,10 +177,6 @@ def check_predictions(plan: CheckPlan) -> Iterator[str]:
     for action in actions[:STEPS]:
         yield from faults_of_prediction(scenario, actions, rng)
         scenario.step(action)
-    prediction = scenario.predict()
-    has_tables = prediction is not None and prediction.tables() is not None
-    if has_tables and (reason := too_many_joint_actions(scenario)):
-        plan.skipped["tables"] = reason
 
 
 def check_sensed_and_predicted(plan: CheckPlan) -> Iterator[str]:

@@ -1,22 +1,18 @@
-"""Checks of a prediction: shapes, shared and own variables, and tables of all joint actions.
+"""Checks of a prediction: shapes, shared and own variables, and equivalent actions.
 
 Shared variables must be equal for all agents that share them, and own variables must not depend on
-the actions of other agents. Compiled kernels read the tables of a prediction without checking their
-sizes, so a missing row would be read from elsewhere in memory.
+the actions of other agents. Actions that a prediction declares as equivalent must have one outcome,
+because searches predict only the first of them.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from ...core.interface.prediction import Blocks, Prediction, Tables, states_by_group
+from ...core.interface.prediction import Prediction, states_by_group
 from ...core.interface.scenario import Scenario
 from ...core.numerics import BoolArray, FloatArray, IntArray
 
-MAX_JOINT_ACTIONS = 4**8
-"""Maximum number of joint actions for which tables are requested, to limit memory."""
-MAX_COMPARED = 1024
-"""Maximum number of joint actions that are compared; of more a sample is drawn."""
 TOLERANCE = 1e-9
 """Allowed difference of predicted numbers, relative to the larger of 1 and their size."""
 
@@ -33,7 +29,7 @@ def faults_of_prediction(
     joint_actions
         ``(m, n)`` joint actions to predict.
     rng
-        Draws the joint actions for which large tables are compared.
+        Draws the actions of other groups.
     """
     prediction = scenario.predict()
     if prediction is None:
@@ -49,17 +45,8 @@ def faults_of_prediction(
             yield f"states of agent {i} after a joint action depend on those predicted with it"
     yield from faults_of_sharing(scenario, states)
     yield from _wrong_groups(scenario, prediction, unchanged, states)
-    tables = prediction.tables()
-    if tables is not None and tables.rewarded:
-        yield from _wrong_tables(scenario, prediction, tables, rng)
-    else:
-        yield from _own_variable_moved(scenario, prediction, unchanged, rng)
-
-
-def too_many_joint_actions(scenario: Scenario) -> str:
-    """Return why the tables of a scenario are not checked; empty if they are."""
-    count = len(scenario.action_set) ** len(scenario.agents)
-    return f"more than {MAX_JOINT_ACTIONS:,} joint actions" if count > MAX_JOINT_ACTIONS else ""
+    yield from _wrong_equivalents(scenario, prediction, unchanged, states)
+    yield from _own_variable_moved(scenario, prediction, unchanged, rng)
 
 
 def _misformed(
@@ -100,82 +87,37 @@ def _wrong_groups(
         yield f"states_by_group and states differ in {name} of agent {agent}"
 
 
-def _wrong_tables(
-    scenario: Scenario, prediction: Prediction, tables: Tables, rng: np.random.Generator
+def _wrong_equivalents(
+    scenario: Scenario, prediction: Prediction, joint_actions: IntArray, states: FloatArray
 ) -> Iterator[str]:
-    """Yield differences between the tables and the predicted states."""
-    n = len(scenario.agents)
+    """Yield robot actions that are declared as equivalent and have other outcomes."""
+    alike = prediction.alike
+    if alike is None:
+        return
     n_actions = len(scenario.action_set)
-    count = n_actions**n
-    if too_many_joint_actions(scenario):
+    shape = len(scenario.groups), n_actions ** max(map(len, scenario.groups))
+    if np.shape(alike) != shape:
+        yield f"alike of shape {np.shape(alike)}, must be {shape}"
         return
-    indices = np.sort(rng.choice(count, min(count, MAX_COMPARED), replace=False))
-    joint_actions = np.stack(np.unravel_index(indices, (n_actions,) * n), axis=-1)
-    for group in scenario.groups:
-        divisor = n_actions ** (n - 1 - group[-1])
-        for agent in group:
-            blocks = tables.blocks(agent)
-            which = f"blocks of agent {agent}:"
-            if blocks.divisor != divisor:
-                yield f"{which} divisor = {blocks.divisor}, must be {divisor}"
-            for fault in _misshapen(blocks, n_actions ** len(group), count, scenario):
-                yield f"{which} {fault}"
-            expected = prediction.states(agent, joint_actions)
-            actual = blocks.states(indices)
-            wrong = differs(scenario, actual, np.asarray(expected))
-            if blocks.alone:
-                wrong[:, : scenario.state_space.n_own] = False
-            for row, j in np.argwhere(wrong):
-                yield (
-                    f"{which} {scenario.state_space.variables[j].name} = {actual[row, j]:.6g} "
-                    f"after joint action {joint_actions[row].tolist()}, "
-                    f"states has {expected[row, j]:.6g}"
-                )
-    yield from _wrong_rewards(prediction, tables, indices, joint_actions, count)
-
-
-def _misshapen(blocks: Blocks, n_own_rows: int, count: int, scenario: Scenario) -> Iterator[str]:
-    """Yield wrong shapes of blocks, which would make a kernel read a wrong row."""
-    n_own = scenario.state_space.n_own
-    d = scenario.state_space.n_variables
-    for name, table, rows, width, n_rows in (
-        ("own", blocks.own, blocks.own_rows, n_own, n_own_rows),
-        ("shared", blocks.shared, blocks.shared_rows, d - n_own, count),
-    ):
-        if np.shape(table)[1:] != (width,) or not len(table):
-            yield f"{name} of shape {np.shape(table)}, must be (rows, {width})"
-        if not np.isfinite(table).all():
-            yield f"{name} is not finite"
-        nothing = name == "own" and not width and len(table) == 1
-        if not len(rows) and len(table) != n_rows and not nothing:
-            yield f"{name} has {len(table)} rows and no {name}_rows, must have {n_rows} rows"
-        if len(rows) and len(rows) != n_rows:
-            yield f"{name}_rows has {len(rows)} entries, must have {n_rows}"
-        if len(rows) and not 0 <= rows.min() <= rows.max() < len(table):
-            named = f"{name}_rows names rows {rows.min()} to {rows.max()}"
-            yield f"{named}, {name} has {len(table)} rows"
-
-
-def _wrong_rewards(
-    prediction: Prediction,
-    tables: Tables,
-    indices: IntArray,
-    joint_actions: IntArray,
-    count: int,
-) -> Iterator[str]:
-    rewards = prediction.rewards(joint_actions)
-    if rewards is None:
-        return
-    table = tables.reward_table()
-    expected = np.asarray(rewards)
-    if np.shape(table) != (count,):
-        yield f"reward_table of shape {np.shape(table)}, must be {(count,)}"
-    actual = np.asarray(table)[indices]
-    for row in np.flatnonzero(~is_close(actual - expected, expected)):
-        yield (
-            f"reward_table: {actual[row]:.6g} after joint action {joint_actions[row].tolist()}, "
-            f"rewards has {expected[row]:.6g}"
-        )
+    replaced = joint_actions.copy()
+    for group, equivalent in zip(scenario.groups, alike, strict=True):
+        members = list(group)
+        digits = (n_actions,) * len(members)
+        first = equivalent[: n_actions ** len(members)]
+        in_order = (first >= 0) & (first <= np.arange(len(first)))
+        if not (in_order.all() and (first[first] == first).all()):
+            yield "alike must hold the first equivalent robot-action index of each index"
+            return
+        actions = np.ravel_multi_index(tuple(joint_actions[:, members].T), digits)
+        replaced[:, members] = np.stack(np.unravel_index(first[actions], digits), axis=-1)
+    for agent, expected in enumerate(states):
+        wrong = differs(scenario, prediction.states(agent, replaced), expected)
+        for row, j in np.argwhere(wrong):
+            yield (
+                f"{scenario.state_space.variables[j].name} of agent {agent} differs after joint "
+                f"actions {joint_actions[row].tolist()} and {replaced[row].tolist()}, which alike "
+                "declares as equivalent"
+            )
 
 
 def state_differences(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.numerics import FloatArray, IntArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.core.values.partitions import Partition
 from nested_agents.core.values.rule_base import RuleBase
 
@@ -32,13 +31,6 @@ def strengths(partition: Partition, x: np.ndarray) -> FloatArray:
 def values(rules: RuleBase, theta: FloatArray, states: FloatArray) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)`` as phi times theta (Eq. 9)."""
     return rules.features(states) @ theta
-
-
-def block_values(
-    rules: RuleBase, theta: FloatArray, blocks: Blocks, indices: IntArray
-) -> FloatArray:
-    """Return f of joint-action indices, every next state written out."""
-    return values(rules, theta, blocks.states(indices))
 
 
 def td_update(

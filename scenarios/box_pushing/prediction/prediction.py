@@ -1,8 +1,6 @@
 """Predictions of box pushing: next states and rewards of joint actions, computed on request.
 
-The poses after a joint action come from the push predictor, at once for all robots. In tables an
-agent's own variables are predicted as if its robot pushed alone, so that they have few values; in
-state spaces with the wheel speed as the only own variable that is exact.
+The poses after a joint action come from the push predictor, at once for all robots.
 """
 
 from __future__ import annotations
@@ -10,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.prediction import Assumptions, Blocks, EmbodiedPrediction, Tables
+from ....core.interface.prediction import Assumptions, EmbodiedPrediction
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ....core.search.best_response import RespondingPrediction, Responses, Search
@@ -30,7 +27,7 @@ from .poses import samples_of
 from .push import push
 from .responses import Outlook, respond
 from .twists import mean_twists
-from .wheel_commands import WheelCommands, robot_actions, speeds_of, twist_table, wheel_commands_of
+from .wheel_commands import WheelCommands, robot_actions, speeds_of, wheel_commands_of
 
 CONTACT_GAP_M = 0.002
 """Predicted gap below which a robot counts as touching."""
@@ -78,7 +75,7 @@ class PredictionSettings:
     """Prediction horizon [s]."""
 
 
-class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
+class BoxPrediction(EmbodiedPrediction, RespondingPrediction):
     """Prediction from one situation.
 
     Parameters
@@ -90,9 +87,6 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
     settings
         Settings that all predictions of the scenario share.
     """
-
-    merges_twists: ClassVar[bool] = True
-    """Whether wheel commands of one twist lead to the same situation."""
 
     def __init__(
         self, situation: PresentState, model: PushModel, settings: PredictionSettings
@@ -169,7 +163,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
         None if a state variable or the rule base is not compiled, or there is one agent only.
         """
         space = self.settings.space
-        is_compiled = space.is_built_in and not space.own_needs_pose and rules.is_triangular
+        is_compiled = space.is_built_in and rules.is_triangular
         if len(self.situation.speeds) == 1 or not is_compiled:
             return None
         return partial(self._respond, rules)
@@ -199,72 +193,22 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
             )
         return joint
 
-    @cached_property
-    def _table(self) -> tuple[SituationBatch, IntArray]:
-        """Situations after all combinations of twists; the row of every joint-action index."""
-        actions, rows = twist_table(self.wheel_commands, self.merges_twists)
-        return self._after(actions, self.settings.horizon), rows
-
-    @cached_property
-    def _shared(self) -> FloatArray:
-        """The shared variables ``(M, m, d - n_own)`` in the situations of the table."""
-        return self.settings.space.shared(self._table[0], range(len(self.groups)))
-
-    def tables(self) -> Tables:
-        """Return itself: it has tables of all joint actions."""
-        return self
-
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next states of `agent` for all joint actions, own variables as if alone."""
-        r, wheel = divmod(agent, len(self.groups[0]))
-        space = self.settings.space
-        speeds = self.wheel_commands.speeds[r, :, wheel]
-        poses = self._poses_alone(r) if space.own_needs_pose else np.zeros((len(speeds), 3))
-        return Blocks(
-            space.own(poses, speeds, self.situation.goal),
-            self._shared[r],
-            divisor=len(self.settings.action_set) ** sum(map(len, self.groups[r + 1 :])),
-            shared_rows=self._table[1],
-            alone=space.own_needs_pose,
-        )
-
-    def _poses_alone(self, r: int) -> FloatArray:
-        """Return the poses ``(K, 3)`` of a robot after each of its actions, if it pushed alone."""
-        only = slice(r, r + 1)
-        model = self.model._replace(
-            radii=self.model.radii[only], compliance=self.model.compliance[only]
-        )
-        now = self.situation
-        twists = self.wheel_commands.twists[only]
-        actions = np.arange(twists.shape[1])[None]
-        robots, _, _ = push(
-            now.robots[only], now.box, twists, actions, self.settings.horizon, model
-        )
-        return robots[0].T
-
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         actions, batch = self._at_horizon(joint_actions)
         r, wheel = divmod(agent, len(self.groups[0]))
-        space = self.settings.space
         speeds = self.wheel_commands.speeds[r, actions[r], wheel]
-        own = space.own(batch.robots[r].T, speeds, self.situation.goal)
-        return np.concatenate([own, space.shared(batch, [r])[0]], axis=1)
+        shared = self.settings.space.shared(batch, [r])[0]
+        return np.concatenate([speeds[:, None], shared], axis=1)
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return the next own variables of all agents and the shared ones of all robots.
+        """Return the next wheel speeds of all agents and the shared variables of all robots.
 
-        ``(n, m, n_own)`` and ``(M, m, d - n_own)``, for joint actions ``(m, n)``.
+        ``(n, m, 1)`` and ``(M, m, d - 1)``, for joint actions ``(m, n)``.
         """
         actions, batch = self._at_horizon(joint_actions)
-        space = self.settings.space
         speeds = speeds_of(actions, self.wheel_commands.speeds)
-        poses: FloatArray = np.zeros((0, 3))
-        if space.own_needs_pose:
-            of_robots = batch.robots.transpose(0, 2, 1)
-            poses = np.repeat(of_robots, len(speeds) // len(of_robots), axis=0).reshape(-1, 3)
-        own = space.own(poses, speeds.reshape(-1), self.situation.goal)
-        return own.reshape(*speeds.shape, -1), space.shared(batch, range(len(actions)))
+        return speeds[:, :, None], self.settings.space.shared(batch, range(len(actions)))
 
     def poses(self, joint_actions: IntArray) -> SituationBatch:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
@@ -316,14 +260,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction, Tables):
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""
-        return self._rewards(self._at_horizon(joint_actions)[1])
-
-    def reward_table(self) -> FloatArray:
-        """Return the predicted rewards ``(A ** n,)`` of all joint actions."""
-        batch, rows = self._table
-        return self._rewards(batch)[rows]
-
-    def _rewards(self, batch: SituationBatch) -> FloatArray:
+        batch = self._at_horizon(joint_actions)[1]
         gaps = np.ascontiguousarray(batch.gaps.T)
         readings = self.settings.infrared.reading(gaps)
         distance, approach, turn = progress_of(batch)

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -91,7 +90,7 @@ class Future:
 
 
 class ExactPrediction(BoxPrediction):
-    """Prediction by simulation; own variables in tables are those of a robot alone.
+    """Prediction by simulation.
 
     Parameters
     ----------
@@ -100,8 +99,6 @@ class ExactPrediction(BoxPrediction):
     future
         The simulation.
     """
-
-    merges_twists: ClassVar[bool] = False  # wheels that command one twist may slip differently
 
     def __init__(
         self,

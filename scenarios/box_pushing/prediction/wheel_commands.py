@@ -3,8 +3,6 @@
 A *robot action* is the actions of a robot's wheels read as one number in base ``A``; a
 *joint-action index*, those of all wheels. Several robot actions often command the same wheel
 speeds: a resting wheel is maintained or zeroed, and one at its limit is maintained or increased.
-Wheels on one side of a skid-steer have the same effect on its motion, so that its distinct twists
-are fewer still.
 """
 
 from typing import NamedTuple
@@ -12,9 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
-
-SAME_TWIST = 1e-11
-"""Twists [m/s, rad/s] that differ by less are one twist."""
 
 
 class WheelCommands(NamedTuple):
@@ -73,50 +68,6 @@ def robot_actions(joint_actions: IntArray, n_robots: int, n_actions: int) -> Int
             for j in range(r * wheels, (r + 1) * wheels):
                 actions[r, c] = actions[r, c] * n_actions + joint_actions[c, j]
     return actions
-
-
-@njit(cache=True)
-def twist_table(commands: WheelCommands, merge: bool) -> tuple[IntArray, IntArray]:
-    """Return all combinations of distinct commands, and the one of every joint-action index.
-
-    The combinations are robot actions ``(M, m)``, the indices number them, ``(A ** n,)``. With
-    `merge`, commands of one twist count as one.
-    """
-    n, count = commands.alike.shape
-    firsts = np.empty((n, count), np.int64)
-    numbers = np.empty((n, count), np.int64)
-    sizes = np.zeros(n, np.int64)
-    for r in range(n):
-        for c in range(count):
-            number = 0 if merge else sizes[r]
-            if commands.alike[r, c] < c:
-                number = numbers[r, commands.alike[r, c]]
-            while number < sizes[r] and not _same_twist(commands.twists[r], c, firsts[r, number]):
-                number += 1
-            numbers[r, c] = number
-            if number == sizes[r]:
-                firsts[r, number] = c
-                sizes[r] += 1
-    choices = np.empty((n, sizes.prod()), np.int64)
-    rows = np.zeros(1, np.int64)
-    behind = choices.shape[1]
-    for r in range(n):
-        behind //= sizes[r]
-        for c in range(choices.shape[1]):
-            choices[r, c] = firsts[r, c // behind % sizes[r]]
-        former = rows
-        rows = np.empty(len(former) * count, np.int64)
-        for c in range(len(rows)):
-            rows[c] = sizes[r] * former[c // count] + numbers[r, c % count]
-    return choices, rows
-
-
-@njit(cache=True)
-def _same_twist(twists: FloatArray, one: int, other: int) -> bool:
-    difference = 0.0
-    for i in range(3):
-        difference = max(difference, abs(twists[one, i] - twists[other, i]))
-    return difference < SAME_TWIST
 
 
 @njit(cache=True)

@@ -1,19 +1,18 @@
 """State spaces of box pushing.
 
-The own variables of an agent are functions of its robot's pose and of its wheel speed. The shared
-variables are those of `variables`. A spec chooses a state space of `STATE_SPACES` by name, or lists
-shared variables, built in or of its own.
+The own variable of an agent is its wheel speed. The wheels of a robot share all others, which are
+those of `variables`. A spec chooses a state space of `STATE_SPACES` by name, or lists shared
+variables, built in or of its own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi
 
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
-from ....core.numerics import FloatArray, wrap
+from ....core.numerics import FloatArray
 from ...state_variables import StateVariable, find_variable, space_of
 from .situations import SituationBatch, whole_batch
 from .variables import STATE_VARIABLES, Columns, columns_of, evaluate
@@ -25,10 +24,6 @@ class BoxStateSpace:
 
     space: StateSpace
     """Names, ranges and membership centers."""
-    own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-    """``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``."""
-    own_needs_pose: bool
-    """Whether `own` depends on the poses."""
     variables: tuple[StateVariable, ...]
     """The shared variables, in order."""
 
@@ -43,7 +38,7 @@ class BoxStateSpace:
         return all(variable.trusted for variable in self.variables)
 
     def shared(self, batch: SituationBatch, robots: Sequence[int]) -> FloatArray:
-        """Return the shared variables ``(k, m, d - n_own)`` of k robots in m situations.
+        """Return the shared variables ``(k, m, d - 1)`` of k robots in m situations.
 
         Raises
         ------
@@ -61,15 +56,6 @@ class BoxStateSpace:
         return out
 
 
-def _own_of_paper(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
-    """Return theta_i, phi_i, d_i and omega_i of Eq. 1."""
-    x, y = (goal[:2] - poses[:, :2]).T
-    heading = poses[:, 2]
-    bearing = wrap(np.arctan2(y, x) - heading)
-    return np.stack([wrap(heading), bearing, np.hypot(x, y), speeds], axis=1)
-
-
-_EVEN = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))
 _E_PUCK_SPEED = 0.13
 _SPEED = Variable(
     "wheel_speed",
@@ -90,32 +76,20 @@ def build_space(name: str, *shared: str) -> BoxStateSpace:
     ValueError
         If there is none, one is unknown or named twice.
     """
-    variables = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
-    return BoxStateSpace(
-        space_of(name, _SPEED, variables),
-        lambda poses, speeds, goal: speeds[:, None],
-        own_needs_pose=False,
-        variables=variables,
-    )
+    return _space_over(name, [find_variable(STATE_VARIABLES, one) for one in shared])
+
+
+def _space_over(name: str, shared: Sequence[StateVariable]) -> BoxStateSpace:
+    return BoxStateSpace(space_of(name, _SPEED, shared), tuple(shared))
 
 
 def _space_of_paper() -> BoxStateSpace:
-    """Return the state of Eq. 1, in the order of its own and its shared part."""
-    orientation, bearing, distance = (
-        find_variable(STATE_VARIABLES, name)
-        for name in ("box_orientation", "box_goal_bearing", "box_distance")
-    )
-    coarse = Variable("box_distance", "m", 0.0, 1.2, mirrored="same")
-    shared = (orientation, bearing, replace(distance, variable=coarse))
-    angles = (
-        Variable(name, "rad", -pi, pi, True, centers, mirrored="opposite")
-        for name, centers in (("heading", _EVEN), ("goal_bearing", ()))
-    )
-    goal_distance = Variable("goal_distance", "m", 0.0, 1.5, mirrored="same")
-    described = (*angles, goal_distance, _SPEED, *(each.variable for each in shared))
-    common = tuple(each.variable.name for each in shared)
-    space = StateSpace("paper", described, n_own=4, common=common)
-    return BoxStateSpace(space, _own_of_paper, own_needs_pose=True, variables=shared)
+    """Return the state of Eq. 1, with even membership functions of the distance of the box."""
+    names = ("heading", "goal_bearing", "goal_distance", "box_orientation", "box_goal_bearing")
+    shared = [find_variable(STATE_VARIABLES, one) for one in names]
+    distance = find_variable(STATE_VARIABLES, "box_distance")
+    even = Variable("box_distance", "m", 0.0, 1.2, mirrored="same")
+    return _space_over("paper", [*shared, replace(distance, variable=even)])
 
 
 _PROGRESS = ("box_distance", "approach")
@@ -124,7 +98,7 @@ _TEAM = ("gap", "face_bearing", "side", "others_away")
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
     "paper": _space_of_paper(),
-    # The same with the box as the goal of an agent. Others move the box, so only the speed is own.
+    # The same with the box as the goal of an agent.
     "paper-box": build_space(
         "paper-box",
         "heading",
@@ -159,7 +133,7 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
 
     Examples
     --------
-    >>> state_space_for("paper", 0.26).space.variables[3].centers
+    >>> state_space_for("paper", 0.26).space.variables[0].centers
     (-0.26, -0.13, 0.0, 0.13, 0.26)
     """
     space = (

@@ -289,6 +289,19 @@ def path_cross_track_error(situation: Situation, robot: Robot) -> float:
     return _miss(situation, _path(situation))
 
 
+@_angle((), ())
+def goal_bearing(situation: Situation, robot: Robot) -> float:
+    """Bearing of the goal in the frame of the robot (Eq. 1)."""
+    goal = situation.goal
+    return wrap_one(angle_of(goal[0] - robot.x, goal[1] - robot.y) - robot.heading)
+
+
+@_variable("m", 0.0, 1.5, mirrored="same")
+def goal_distance(situation: Situation, robot: Robot) -> float:
+    """Distance of the robot from the goal (Eq. 1)."""
+    return np.hypot(situation.goal[0] - robot.x, situation.goal[1] - robot.y)
+
+
 @_angle(_EVEN, (), common=True)
 def box_orientation(situation: Situation, robot: Robot) -> float:
     """Angle of the box in the world frame (Eq. 1)."""

@@ -17,7 +17,6 @@ from nested_agents.core.agents.loop import StepRecord, control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.abilities import Embodiment
-from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
@@ -249,9 +248,6 @@ def test_predictions_are_those_of_the_world(pair) -> None:
     both = np.concatenate([expected.states(i, joint) for i in range(2)], axis=1)
     assert (prediction.states(0, codes) == both).all()
     assert (prediction.rewards(codes) == expected.rewards(joint)).all()
-    assert (prediction.reward_table() == expected.reward_table()).all()
-    blocks = prediction.blocks(0)
-    assert (blocks.states(np.arange(16)) == both).all()
 
 
 def test_a_team_of_one_acts_and_learns(pair) -> None:
@@ -265,47 +261,15 @@ def test_a_team_of_one_acts_and_learns(pair) -> None:
     assert fuzzy(team).evaluator.counts.joint_actions == 10 * 16
 
 
-class Limited(Prediction):
-    """Prediction of a line world that supports only the methods given."""
-
-    def __init__(self, prediction, *names: str) -> None:
-        self.complete = prediction
-        for name in names:
-            setattr(self, name, getattr(prediction, name))
-
-    def states(self, agent, joint_actions):
-        return self.complete.states(agent, joint_actions)
-
-
-def capabilities(prediction, n: int) -> set[str]:
-    """What a prediction knows beside next states."""
-    tables = prediction.tables()
-    joint = np.zeros((1, n), dtype=int)
-    known = {
-        "rewards": prediction.rewards(joint) is not None,
-        "blocks": tables is not None,
-        "reward_table": tables is not None and tables.rewarded,
-    }
-    return {name for name, is_known in known.items() if is_known}
-
-
-@pytest.mark.parametrize(
-    ("names", "of_robots", "of_one"),
-    [
-        ((), set(), {"blocks"}),
-        (("rewards",), {"rewards"}, {"rewards", "blocks", "reward_table"}),
-        (("rewards", "tables"),) + ({"rewards", "blocks", "reward_table"},) * 2,
-    ],
-)
-def test_predictions_can_do_what_the_scenarios_can(
-    names, of_robots: set[str], of_one: set[str], line_world
-) -> None:
-    for agents, expected in (("body", of_robots), ("team", of_one)):
-        scenario = join_agents(line_world(2, 1), agents)
-        scenario.reset(0)
-        limited = Limited(scenario.scenario.predict(), *names)
-        found = JointPrediction(limited, scenario)
-        assert capabilities(found, len(scenario.agents)) == expected
+@pytest.mark.parametrize("agents", ["body", "team"])
+def test_rewards_are_predicted_where_the_scenario_predicts_them(agents: str, line_world) -> None:
+    scenario = join_agents(line_world(2, 1), agents)
+    scenario.reset(0)
+    complete = scenario.scenario.predict()
+    joint = np.zeros((1, len(scenario.agents)), dtype=int)
+    assert JointPrediction(complete, scenario).rewards(joint) is not None
+    complete.rewards = lambda joint_actions: None
+    assert JointPrediction(complete, scenario).rewards(joint) is None
 
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
@@ -321,19 +285,6 @@ def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
     one, other = world.step(np.array([0, 1, 2, 3])), robots.step(np.array([1, 11]))
     assert (other.states[0] == [*one.states[0, :2], *one.states[1]]).all()
     assert other.reward == one.reward
-
-
-def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
-    robots = join_agents(line_world(2, 2), "body")
-    robots.reset(0)
-    robots.step(np.array([0, 5]))
-    prediction = robots.predict()
-    codes = np.arange(256)
-    joint = np.stack([codes // 16, codes % 16], axis=1)
-    for agent in range(2):
-        blocks = prediction.blocks(agent)
-        assert blocks.states(codes) == pytest.approx(prediction.states(agent, joint))
-    assert prediction.reward_table() == pytest.approx(prediction.rewards(joint))
 
 
 def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> None:

@@ -121,7 +121,9 @@ def test_every_part_is_paid_its_own_rewards(world, taken_in) -> None:
     calls = [taken_in(part) for part in team.parts]
     paid = Transition(states, np.array([1.0, 2.0, 3.0, 4.0]), False, False, {})
     team.learn(Experience(look(world, states), decision, paid, last=False))
-    for ((left, taken, entered, rewards, _),), members in zip(calls, ([2, 3], [0, 1]), strict=True):
+    for (call,), members in zip(calls, ([2, 3], [0, 1]), strict=True):
+        left, taken, entered, rewards, _, duration = call
+        assert duration == 1
         assert rewards.tolist() == [1.0 + member for member in members]
         assert taken.tolist() == decision.joint_action[members].tolist()
         assert (left[:, : states.shape[1]] == states[members]).all()

@@ -218,7 +218,7 @@ def test_actions_are_passed_down_and_the_unseen_maintain(edges, told, world) -> 
     names = world.agents
     hierarchy = Hierarchy(names, [(names[a], names[b]) for a, b in edges])
     team = team_of("frozen", world, hierarchy=hierarchy)
-    witness = fuzzy(team).evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
+    witness = fuzzy(team).search.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
     world.reset(0)
     assert joint_of(team, world, explore=False).tolist() == [0, 1, 3, 0]
     assert [witness.told[i] for i in range(4)] == told
@@ -227,7 +227,7 @@ def test_actions_are_passed_down_and_the_unseen_maintain(edges, told, world) -> 
 
 def test_frequencies_are_what_was_seen(world) -> None:
     team = team_of("random", world)
-    fuzzy(team).evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
+    fuzzy(team).search.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
     fuzzy(team).explorer = BurstExploration(rate=0.0, floor=0.0).build(4)
     world.reset(0)
     for _ in range(6):
@@ -423,7 +423,7 @@ def acting(world, unseen: str, told: str, failures=()) -> tuple[Team, list[np.nd
 def known_to_the_last(world, unseen: str, told: str, previous=None) -> tuple[list[int], list[int]]:
     """What the last agent of four reckons with, and what all did."""
     team, _ = acting(world, unseen, told)
-    witness = fuzzy(team).evaluator = Witness([0, 1, 3, 0])
+    witness = fuzzy(team).search.evaluator = Witness([0, 1, 3, 0])
     joint = joint_of(team, world, explore=False, previous=previous)
     return witness.told[3], joint.tolist()
 
@@ -472,7 +472,7 @@ class Sarsa(Learner):
     def begin_episode(self):
         self.before = None
 
-    def observe_decision(self, left, joint_action, states, reward, terminated):
+    def observe_decision(self, left, joint_action, states, reward, terminated, duration):
         self.met.append((left, joint_action, states))
         features, every = self.rules.features(left), np.arange(len(left))
         weights = self.theta.reshape(len(left), 3, -1)

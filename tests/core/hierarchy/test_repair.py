@@ -96,7 +96,7 @@ def test_whoever_has_left_is_neither_asked_nor_considered() -> None:
     assert world.action_set.names[joint[1]] == "zero"
     team.reset(0, 0)
     team.act(look(world), explore=False)
-    assert agents.hierarchy is team.hierarchy
+    assert agents.search.hierarchy is team.hierarchy
 
 
 @pytest.mark.parametrize("evaluator", ["exact", "best-response"])

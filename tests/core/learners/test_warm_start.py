@@ -69,7 +69,7 @@ def test_batch_td_regresses_on_all_experience_of_teams_of_any_size() -> None:
     states, rewards = experience()
     teams = [BatchTD(settings, rules, np.zeros(n, dtype=int)) for n in (1, 3, 2)]
     for before, after in zip([None, *teams], teams, strict=False):
-        n = len(after.members[0])
+        n = len(after.rows)
         if before is not None:
             after.warm_start(before, np.array([0]))
         feed(after, states[:, :n], rewards[:, :n])

@@ -179,9 +179,6 @@ class Predicting(Scenario):
         raise NotImplementedError
 
     def predict(self) -> Any:
-        # Tables are compared where there are tables of rewards, too.
-        if hasattr(self.prediction, "blocks"):
-            self.prediction.reward_table = None
         return self.prediction
 
 

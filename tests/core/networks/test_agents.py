@@ -85,7 +85,7 @@ def told_of(team: Team, joint: Any) -> Any:
     agents: Any = team.parts[0]
     inputs = agents.observe(look(agents.scenario), explore=False)
     inputs.noise[0, np.arange(len(joint)), joint] = 1e9
-    team.messages.advance(team._decide(look(agents.scenario), (inputs,)))
+    team.messages.advance(team._decide(look(agents.scenario), (inputs,), None))
     return inputs.actor[0, :, : len(agents.told_names)]
 
 
@@ -170,7 +170,7 @@ def decided(agents: Any, hierarchy: Hierarchy, states: Any, noise: Any) -> tuple
     seen = look(agents.scenario, states)
     inputs = agents.observe(seen, explore=False)
     inputs.noise[0] = noise
-    joint = team._decide(seen, (inputs,))
+    joint = team._decide(seen, (inputs,), None)
     return inputs.logits[0], joint
 
 
@@ -291,7 +291,7 @@ def test_what_arrives_is_learned_from() -> None:
     for action in (0, 1):
         inputs = agents.observe(look(world), explore=False)
         inputs.noise[0, 1, action] = 1e9
-        assert team._decide(look(world), (inputs,))[2] == action
+        assert team._decide(look(world), (inputs,), None)[2] == action
 
 
 def test_without_edges_it_is_mappo_and_by_own_critics_ippo() -> None:

@@ -187,7 +187,7 @@ def test_weights_go_on_with_the_names_of_inputs(critic: str) -> None:
         first = int(there.team.hierarchy.order[0])
         seen = look(there.scenario, states[: len(there.scenario.agents)])
         inputs = agents.observe(seen, explore=False)
-        there.team._decide(seen, (inputs,))
+        there.team._decide(seen, (inputs,), None)
         alike = look(former.scenario, states[:3])
         own = former.observe(alike, explore=False)
         own.actor[..., : len(former.told_names)] = 0.0

@@ -134,7 +134,7 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
 def test_values_of_other_than_all_actions_are_refused(line_world) -> None:
     world = line_world(carts=2, wheels=1)
     team = team_of(BatchTDSettings(), world)
-    fuzzy(team).evaluator = SimpleNamespace(values=lambda deliberation: np.zeros(2))
+    fuzzy(team).search.evaluator = SimpleNamespace(values=lambda deliberation: np.zeros(2))
     team.reset(0, 0, learn=True)
     world.reset(0)
     with pytest.raises(ValueError, match=r"^the evaluator returned 2 values for 4 actions$"):

@@ -19,7 +19,7 @@ from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.search.budget import divide
 from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
-from nested_agents.scenarios.line_up import LineUp, LineUpSettings
+from nested_agents.scenarios.line_up import LineUp, LineUpPrediction, LineUpSettings
 from nested_agents.topologies import build
 
 SEARCHES = ("auto", "exact", "sampling", "best-response")
@@ -50,6 +50,19 @@ class Pairs(LineUp):
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """Agents by robot."""
         return tuple((i, i + 1) for i in range(0, len(self.agents), 2))
+
+    def predict(self) -> "PairsPrediction":
+        """Return the prediction, whose shared variables are those of the left wheels."""
+        return PairsPrediction(super().predict()._places)
+
+
+class PairsPrediction(LineUpPrediction):
+    """Predictions of line-ups with two carts in a group."""
+
+    def states_by_group(self, joint_actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return own variables of all carts, and shared variables of all pairs."""
+        own, shared = super().states_by_group(joint_actions)
+        return own, shared[::2]
 
 
 def learner_of(search: Any, budget: int, **decision: Any) -> TDLambdaSettings:

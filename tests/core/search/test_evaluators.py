@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.interface.prediction import Blocks, Prediction, Tables
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.search import EVALUATORS
 from nested_agents.core.search.enumeration import (
@@ -52,7 +52,7 @@ def problem_of(
     return DecisionProblem(rules, hierarchy, A, alone, rule, teammates, DISCOUNT)
 
 
-class Tabled(Prediction, Tables):
+class Tabled(Prediction):
     """A prediction without any structure: random next states and rewards by joint action."""
 
     def __init__(self, states: np.ndarray, rewards: np.ndarray) -> None:
@@ -65,16 +65,6 @@ class Tabled(Prediction, Tables):
     def rewards(self, joint_actions: np.ndarray) -> np.ndarray:
         return self.paid[joint_actions @ self.places]
 
-    def tables(self) -> "Tabled":
-        return self
-
-    def blocks(self, agent: int) -> Blocks:
-        own = np.zeros((1, 0))
-        return Blocks(own, np.ascontiguousarray(self.table[agent]), 1)
-
-    def reward_table(self) -> np.ndarray:
-        return self.paid
-
     def permuted(self, permutation: list[int]) -> "Tabled":
         """The same world with agent ``permutation[k]`` listed as k-th."""
         n = len(permutation)
@@ -82,14 +72,24 @@ class Tabled(Prediction, Tables):
         return Tabled(self.table[permutation][:, indices], self.paid[indices])
 
 
-class NoTables(Tabled):
-    """A prediction that cannot list all joint actions."""
+class Recorded(Tabled):
+    """A prediction that counts the joint actions for which it is asked."""
 
-    def blocks(self, agent: int) -> Blocks:
-        raise AssertionError("asked for a table of all joint actions")
+    asked = 0
 
-    def reward_table(self) -> np.ndarray:
-        raise AssertionError("asked for a table of all joint actions")
+    def states(self, agent: int, joint_actions: np.ndarray) -> np.ndarray:
+        self.asked += len(joint_actions)
+        return super().states(agent, joint_actions)
+
+
+class Halved(Tabled):
+    """A prediction in which the last two actions of every agent have one outcome."""
+
+    def __init__(self, states: np.ndarray, rewards: np.ndarray) -> None:
+        every = np.indices((A,) * len(states)).reshape(len(states), -1).T
+        first = np.minimum(every, A - 2) @ A ** np.arange(len(states) - 1, -1, -1)
+        super().__init__(states[:, first], rewards[first])
+        self.alike = np.tile(np.minimum(np.arange(A), A - 2), (len(states), 1))
 
 
 @pytest.fixture
@@ -171,10 +171,13 @@ def test_enumeration_is_brute_force(
         assert (counts.joint_actions, counts.rule_evaluations) == (tried, evaluations)
 
 
+@pytest.mark.parametrize("kind", [Tabled, Halved])
 @pytest.mark.parametrize("teammates", TEAMMATES)
-def test_without_structure_too(teammates: str, rng: np.random.Generator, rules: RuleBase) -> None:
+def test_without_structure_too(
+    teammates: str, kind: type[Tabled], rng: np.random.Generator, rules: RuleBase
+) -> None:
     flat = RuleBase(rules.partitions, rules.terms)
-    prediction = Tabled(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
+    prediction = kind(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
     frequencies, theta = frequencies_of(rng), rng.normal(size=flat.n_rules)
     hierarchy = hierarchy_of("diamond")
     evaluator = ExactEnumeration(problem_of(flat, hierarchy, "reward-and-value", teammates))
@@ -279,11 +282,13 @@ def test_a_sample_is_shared_by_all_own_actions(rng: np.random.Generator) -> None
         assert sampling.counts.joint_actions == A * 5
 
 
-@pytest.mark.parametrize("name", ["pairs", "apart"])
-def test_nothing_is_tabulated_if_fewer_are_tried(
-    name: str, rng: np.random.Generator, rules: RuleBase
+@pytest.mark.parametrize(
+    ("name", "asked"), [("pairs", 2 * (A**2 + A)), ("apart", 4 * A), ("chain", 4 * A**4)]
+)
+def test_all_joint_actions_are_predicted_only_if_as_many_are_tried(
+    name: str, asked: int, rng: np.random.Generator, rules: RuleBase
 ) -> None:
-    prediction = NoTables(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
+    prediction = Recorded(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
     evaluator = ExactEnumeration(
         problem_of(rules, hierarchy_of(name), "reward-and-value", "best-response")
     )
@@ -292,6 +297,28 @@ def test_nothing_is_tabulated_if_fewer_are_tried(
         evaluator.values(
             DecisionContext(agent, joint, prediction, [theta] * 4, frequencies_of(rng), rng)
         )
+    assert prediction.asked == asked
+
+
+@pytest.mark.parametrize("value_of", ["below", "team"])
+def test_equivalent_actions_have_equal_means(
+    value_of: str, rng: np.random.Generator, rules: RuleBase
+) -> None:
+    flat = RuleBase(rules.partitions, rules.terms)
+    prediction = Halved(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
+    plain = Tabled(prediction.table, prediction.paid)
+    theta = rng.normal(size=(4, flat.n_rules))
+    common = problem_of(flat, hierarchy_of("chain"), "value", "best-response")
+    evaluator = ExactEnumeration(dataclasses.replace(common, value_of=value_of))
+    for agent in range(4):
+        found = [
+            evaluator.values(
+                DecisionContext(agent, np.full(4, 2), known, theta, frequencies_of(rng), rng)
+            )
+            for known in (prediction, plain)
+        ]
+        assert found[0] == pytest.approx(found[1], rel=0, abs=1e-12)
+        assert found[0][A - 2] == found[0][A - 1]
 
 
 def test_a_hundred_agents_apart_are_enumerated() -> None:

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 import values_oracle as oracle
 
-from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.values.partitions import Partition
 from nested_agents.core.values.rule_base import PooledWeights, RuleBase
 from nested_agents.core.values.updates import td_lambda_update
 
-N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
 ROWS = np.arange(3)
 TERMS = {
     "order 1": [(0,), (1,), (2,), (3,)],
@@ -39,19 +37,6 @@ def states_of(rng: np.random.Generator, m: int, d: int = 4) -> np.ndarray:
     return states
 
 
-def blocks_of(rng: np.random.Generator, n_own: int, d: int = 4) -> Blocks:
-    own = states_of(rng, N_ACTIONS**GROUP, d)[:, :n_own]
-    shared = states_of(rng, N_ACTIONS**N_AGENTS, d)[:, n_own:]
-    divisor = int(rng.choice([1, N_ACTIONS, N_ACTIONS**GROUP]))
-    own_rows = shared_rows = np.zeros(0, dtype=np.int64)
-    if rng.random() < 0.7:  # several indices lead to one
-        own_rows = rng.integers(len(own), size=len(own))
-        shared_rows = rng.integers(len(shared) // 2, size=len(shared))
-    return Blocks(
-        np.ascontiguousarray(own), np.ascontiguousarray(shared), divisor, own_rows, shared_rows
-    )
-
-
 @pytest.fixture(params=[0, 2, 4], ids=lambda n: f"{n} own")
 def n_own(request: pytest.FixtureRequest) -> int:
     return request.param
@@ -76,13 +61,6 @@ def test_values(base: RuleBase, rng: np.random.Generator) -> None:
     theta, states = rng.normal(size=base.n_rules), states_of(rng, 60)
     expected = oracle.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
-
-
-def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
-    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
-    indices = rng.integers(N_ACTIONS**N_AGENTS, size=90)
-    expected = oracle.block_values(base, theta, blocks, indices)
-    assert base.block_values(theta, blocks, indices) == pytest.approx(expected, rel=0, abs=1e-12)
 
 
 def td_update(
@@ -161,21 +139,12 @@ def test_summed_values(
 
 def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules)).astype(np.float32)
-    blocks, indices = blocks_of(rng, base.n_own), rng.integers(N_ACTIONS**N_AGENTS, size=50)
     states, rewards = states_of(rng, 3), rng.normal(size=3)
     wide = theta.astype(float), trace.astype(float)
     scale = float(np.abs(theta).max())
-    for found, expected in (
-        (
-            base.block_values(theta[0], blocks, indices),
-            oracle.block_values(base, wide[0][0], blocks, indices),
-        ),
-        (
-            base.values_of_agents(theta, states[:, None])[:, 0],
-            np.einsum("ij,ij->i", base.features(states), wide[0]),
-        ),
-    ):
-        assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
+    found = base.values_of_agents(theta, states[:, None])[:, 0]
+    expected = np.einsum("ij,ij->i", base.features(states), wide[0])
+    assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
     steps = 0.1 * (rewards - np.einsum("ij,ij->i", base.features(states), wide[0]))
     constants = 0.0, np.full(3, 0.1), 0.38
     td_update(base, theta, ROWS, trace, states, states, rewards, constants)
@@ -183,15 +152,6 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     assert theta.dtype == trace.dtype == np.float32
     assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
     assert theta == pytest.approx(wide[0], rel=1e-5, abs=1e-5)
-
-
-def test_block_values_agree_with_values_of_the_states(
-    base: RuleBase, rng: np.random.Generator
-) -> None:
-    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
-    indices = np.arange(N_ACTIONS**N_AGENTS)
-    expected = base.values(theta, blocks.states(indices))
-    assert base.block_values(theta, blocks, indices) == pytest.approx(expected, rel=0, abs=1e-12)
 
 
 def test_a_states_array_in_any_memory_order(base: RuleBase, rng: np.random.Generator) -> None:
@@ -218,12 +178,6 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     states[:, 4:] += 0.01 * rng.normal(size=(24, 3))  # a few own blocks, shared ones near by
     expected = oracle.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
-    for size in (1, 2, 3, 24):
-        blocks, indices = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=size)
-        blocks.own[:, 3] = rng.choice([0.1, 0.5, 0.52, 0.9], len(blocks.own))  # levels shared
-        expected = oracle.block_values(base, theta, blocks, indices)
-        found = base.block_values(theta, blocks, indices)
-        assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
     theta, trace = rng.normal(size=(2, 2, base.n_rules))
     theta_expected, trace_expected = theta.copy(), trace.copy()

@@ -7,7 +7,6 @@ from math import comb
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.values.partitions import Partition
 from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
@@ -206,10 +205,6 @@ def test_wrong_shapes_are_refused_in_one_line(membership: str) -> None:
         (lambda: base.active(np.zeros((2, 1))), pairs.format((2, 1))),
         (lambda: base.active(np.zeros((2, 1, 2))), pairs.format((2, 1, 2))),
         (lambda: base.features(np.zeros((2, 3))), pairs.format((2, 3))),
-        (
-            lambda: base.block_values(np.ones(3), Blocks(one, one, 1), np.zeros(1, int)),
-            "rule base: theta of shape (3,), must be (4,)",
-        ),
     ):
         with pytest.raises(ValueError, match=f"^{re.escape(complaint)}$"):
             call()
@@ -247,6 +242,3 @@ def test_sigmoid_products_equal_sums_over_single_rules() -> None:
     np.testing.assert_allclose(
         base.squared_lengths(states), (np.array(features) ** 2).sum(axis=1), rtol=1e-12
     )
-    blocks = Blocks(states[:, :1], states[:, 1:], 1)
-    found = base.block_values(theta, blocks, np.arange(3))
-    np.testing.assert_allclose(found, expected, rtol=1e-12)

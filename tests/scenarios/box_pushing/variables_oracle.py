@@ -87,6 +87,8 @@ def variables(batch: SituationBatch, robot: int) -> dict[str, FloatArray]:
         "bend": wrap(turn - 2.0 * wrap(course - goal[2])),
         "face_bearing": wrap(_inward(batch, robots[:, robot, :2]) - heading),
         "others_away": np.clip(gaps[:, others] / 0.03, 0.0, 1.0).mean(axis=1),
+        "goal_bearing": wrap(_direction(goal[:2] - robots[:, robot, :2]) - heading),
+        "goal_distance": np.hypot(*(goal[:2] - robots[:, robot, :2]).T),
         "box_orientation": wrap(boxes[:, 2]),
         "box_goal_bearing": wrap(course - boxes[:, 2]),
     }

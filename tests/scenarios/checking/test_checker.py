@@ -15,7 +15,7 @@ import pytest
 from nested_agents import Situation, state_variable
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.core.interface.prediction import Blocks, Prediction
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
@@ -30,7 +30,6 @@ from nested_agents.scenarios.checking.checker import (
     check_scenario,
 )
 from nested_agents.scenarios.checking.episodes import CheckPlan
-from nested_agents.scenarios.checking.predictions import faults_of_prediction
 from nested_agents.scenarios.checking.sensing import faults_of_sensing, predicted_steps
 from nested_agents.scenarios.line_up import (
     DISTANCE,
@@ -289,31 +288,6 @@ def a_tuple(self: Any, joint_action: Any) -> Any:
     return transition.states, transition.reward
 
 
-def tables(
-    blocks: Callable[[Blocks], Blocks] | None = None, rewards: Callable[[Any], Any] | None = None
-) -> Callable[[], Scenario]:
-    """Return a factory of line-ups whose predictions have other tables."""
-
-    class Changed(LineUpPrediction):
-        def blocks(self, agent: int) -> Blocks:
-            sound = super().blocks(agent)
-            return blocks(sound) if blocks and agent == 1 else sound
-
-        def reward_table(self) -> Any:
-            sound = super().reward_table()
-            return rewards(sound) if rewards else sound
-
-    def predict(self: Any) -> Any:
-        return Changed(LineUp.predict(self)._places)
-
-    return line(predict=predict)
-
-
-def rowed(**changes: Any) -> Callable[[], Scenario]:
-    """Return a factory of line-ups whose blocks have other fields."""
-    return tables(lambda blocks: replace(blocks, **changes))
-
-
 def declared(**members: Any) -> Callable[[], Scenario]:
     """Return a factory of line-ups that declare other members."""
 
@@ -519,7 +493,6 @@ def far_reward(self: Any, joint_actions: Any) -> Any:
     return -10 * LineUpPrediction.rewards(self, joint_actions)
 
 
-BLOCKS = "predictions: blocks of agent 1: "
 SENSED = "sensed and predicted: "
 
 FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
@@ -550,55 +523,18 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
         line(step=a_tuple),
         "form: AttributeError in .*: 'tuple' object has no attr",
     ),
-    "own reversed": (
-        tables(lambda b: replace(b, own=b.own[::-1].copy())),
-        BLOCKS + r"distance = \S+ after joint action \[0, 0\], states has",
+    "all alike": (
+        predicting(alike=np.zeros((2, 4), dtype=int)),
+        r"predictions: distance of agent . differs after joint actions \[.*\] and \[.*\], which",
     ),
-    "shared reversed": (
-        tables(lambda b: replace(b, shared=b.shared[::-1].copy())),
-        BLOCKS + "lead = ",
+    "alike of one": (
+        predicting(alike=np.arange(4)[None]),
+        r"predictions: alike of shape \(1, 4\), must be \(2, 4\)",
     ),
-    "shared nearly right": (
-        tables(lambda b: replace(b, shared=b.shared + 1e-6)),
-        BLOCKS + "lead = ",
+    "alike a later one": (
+        predicting(alike=np.array([[0, 1, 3, 3]] * 2)),
+        "predictions: alike must hold the first equivalent robot-action index",
     ),
-    "rewards reversed": (
-        tables(rewards=lambda table: table[::-1]),
-        "predictions: reward_table: .*, rewards has",
-    ),
-    "rewards short": (
-        tables(rewards=lambda table: table[:5]),
-        r"reward_table of shape \(5,\), must be \(16,\)",
-    ),
-    "divisor": (rowed(divisor=4), BLOCKS + "divisor = 4, must be 1"),
-    "shared short": (
-        tables(lambda b: replace(b, shared=b.shared[:5].copy())),
-        BLOCKS + "shared has 5 rows and no shared_rows, must have 16 rows",
-    ),
-    "own short": (
-        tables(lambda b: replace(b, own=b.own[:1].copy())),
-        BLOCKS + "own has 1 rows and no own_rows, must have 4 rows",
-    ),
-    "own wide": (
-        tables(lambda b: replace(b, own=np.hstack([b.own, b.own]))),
-        BLOCKS + r"own of shape \(4, 2\), must be \(rows, 1\)",
-    ),
-    "own rows": (
-        rowed(own_rows=np.array([0, 1, 2, 4])),
-        BLOCKS + "own_rows names rows 0 to 4, own has 4",
-    ),
-    "negative rows": (
-        rowed(shared_rows=np.arange(16) - 1),
-        BLOCKS + "shared_rows names rows -1 to 14",
-    ),
-    "few rows": (rowed(shared_rows=np.arange(5)), BLOCKS + "shared_rows has 5 .* must have 16"),
-    "broken rows": (
-        rowed(own_rows=np.zeros(4)),
-        "predictions: IndexError in states, .* must be of integer",
-    ),
-    "listed own": (rowed(own=[[0.0]]), BLOCKS + "own has 1 rows and no own_rows, must"),
-    "flat own": (rowed(own=np.zeros(4)), BLOCKS + r"own of shape \(4,\), must be \(rows, 1\)"),
-    "NaN own": (rowed(own=np.full((4, 1), np.nan)), BLOCKS + "own is not finite"),
     "equal measures": (declared(measures=(SUCCESS, SUCCESS)), "measures: names .* distinct"),
     "no source": (
         declared(measures=(Measure("speed", "speed", source="velocity"),)),
@@ -781,10 +717,8 @@ BLIND: dict[str, Callable[[], Scenario]] = {
         rewards=lambda self, actions: (
             LineUpPrediction.rewards(self, actions) + 1e-3 * (len(actions) - 1)
         ),
-        tables=lambda self: None,
     ),
     "predictions a little off": inexact(lambda p, i, a: p.states(i, a) + 1e-3),
-    "alike": predicting(alike=np.zeros((2, 4), dtype=int)),
     "after": predicting(after=lambda self, joint_action: self),
     "partners": line(partners=lambda self: (0, 0)),
     "run_episode": line(run_episode=lambda self, *args, **kwargs: None),
@@ -832,11 +766,6 @@ def test_what_could_not_be_checked_is_told_with_the_reason() -> None:
     unchecked = check_scenario(inexact(), steps=6).skipped
     assert unchecked["sensed and predicted"].startswith("without with_exact_prediction")
     assert list(unchecked) == ["roles", "sensed and predicted"]
-    alone = check_scenario(rowed(own=np.full((4, 1), 0.5), alone=True), steps=6)
-    assert "own variables" not in alone.skipped
-    assert check_scenario(LineUpSettings(carts=9).build, steps=6).skipped["tables"] == (
-        "more than 65,536 joint actions"
-    )
 
 
 def test_the_documentation_counts_the_faults() -> None:
@@ -864,40 +793,6 @@ def test_the_command_catches_planted_faults(name: str, capsys: pytest.CaptureFix
     assert line.startswith("FAULT   fault_")
     assert re.search(FAULTS[name][1], line)
     assert line.count("\n") == 1
-
-
-@pytest.mark.parametrize("own", [0.5, np.nan])
-def test_own_variables_as_if_alone_may_differ_but_must_be_numbers(own: float) -> None:
-    factory = rowed(own=np.full((4, 1), own), alone=True)
-    if np.isfinite(own):
-        assert check_scenario(factory).passed
-    else:
-        with pytest.raises(ScenarioError, match="own is not finite"):
-            check_scenario(factory)
-
-
-def test_many_joint_actions_are_drawn_and_too_many_left_out() -> None:
-    class Reversed(LineUpPrediction):
-        def reward_table(self) -> Any:
-            return super().reward_table()[::-1]
-
-    class Many(LineUp):
-        def predict(self) -> Any:
-            return Reversed(super().predict()._places)
-
-    for n, said in ((6, "reward_table: .* after joint action"), (8, "reward_table: ")):
-        scenario = Many(LineUpSettings(carts=n))
-        scenario.reset(0)
-        fault = next(
-            faults_of_prediction(scenario, np.zeros((1, n), int), np.random.default_rng(0)), None
-        )
-        assert re.match(said, fault or "")
-    scenario = Many(LineUpSettings(carts=9))
-    scenario.reset(0)
-    none = next(
-        faults_of_prediction(scenario, np.zeros((1, 9), int), np.random.default_rng(0)), None
-    )
-    assert none is None
 
 
 def test_too_little_to_check_is_refused() -> None:

@@ -317,12 +317,12 @@ def test_robots_as_single_agents_learn_the_same_poses() -> None:
     assert model.predictor.memory["decisions"] == 1
 
 
-def test_compiled_best_responses_are_those_of_the_tables() -> None:
+def test_learned_poses_are_predicted_alike_for_one_agent_and_for_all() -> None:
     scenario = BoxPushingSettings(start="easy").build()
     team = team_of(scenario)
     actions(scenario, team, 1)
     prediction = fuzzy(team).model.predict(look(scenario))
     joint = np.indices((4,) * 4).reshape(4, -1).T[::17]
-    indices = joint @ 4 ** np.arange(3, -1, -1)
-    table = prediction.tables().blocks(1).states(indices)
-    assert prediction.states(1, joint) == pytest.approx(table, abs=1e-9)
+    own, shared = prediction.states_by_group(joint)
+    expected = np.concatenate([own[1], shared[0]], axis=1)
+    assert prediction.states(1, joint) == pytest.approx(expected, abs=1e-9)

@@ -1,4 +1,4 @@
-"""Predictions: block tables, single joint actions and rewards agree with each other."""
+"""Predictions: states of single agents, of all agents, and rewards agree with each other."""
 
 import numpy as np
 import pytest
@@ -20,58 +20,12 @@ def all_joint_actions(n: int) -> np.ndarray:
     return np.indices((4,) * n).reshape(n, -1).T
 
 
-@pytest.mark.parametrize("robots", [1, 2])
-def test_relational_blocks_are_the_states_of_every_joint_action(robots: int) -> None:
-    scenario = moving(robots=robots)
-    prediction, joint = scenario.predict(), all_joint_actions(2 * robots)
-    for agent in range(len(scenario.agents)):
-        tables = prediction.blocks(agent).states(np.arange(len(joint)))
-        np.testing.assert_array_equal(tables, prediction.states(agent, joint))
-
-
-def distinct_commands(prediction) -> int:
-    return len(set(prediction.alike[0].tolist()))
-
-
-def test_wheel_commands_of_one_twist_are_pushed_once() -> None:
-    scenario = moving(robot="four-wheel", robots=1)
-    prediction, joint = scenario.predict(), all_joint_actions(4)
-    for agent in range(4):
-        blocks = prediction.blocks(agent)
-        # Three speeds of each wheel, so six sums at most on each side; two are at rest.
-        assert len(blocks.shared) <= 36 < distinct_commands(prediction)
-        tables = blocks.states(np.arange(len(joint)))
-        np.testing.assert_allclose(tables, prediction.states(agent, joint), rtol=0, atol=1e-12)
-
-
-def test_simulated_predictions_distinguish_wheel_commands_of_one_twist() -> None:
-    prediction = moving(robot="four-wheel", robots=1, predictor="exact").predict()
-    assert len(prediction.blocks(0).shared) == distinct_commands(prediction)
-
-
-def test_the_own_block_of_the_paper_is_that_of_the_robot_alone() -> None:
-    scenario = moving(state_space="paper")
-    prediction, joint = scenario.predict(), all_joint_actions(4)
-    for agent in range(4):
-        tables = prediction.blocks(agent).states(np.arange(256))
-        states = prediction.states(agent, joint)
-        np.testing.assert_array_equal(tables[:, 3:], states[:, 3:])
-        # The distance from the goal of a robot that the other one hardly moves.
-        assert np.abs(tables - states)[:, 2].max() < 0.05
-
-
 def test_predicted_rewards_know_the_sensors() -> None:
-    usual = moving().predict().reward_table()
-    short = moving(infrared={"reach": 0.001}).predict().reward_table()
+    joint = all_joint_actions(4)
+    usual = moving().predict().rewards(joint)
+    short = moving(infrared={"reach": 0.001}).predict().rewards(joint)
     assert (short <= usual).all()
     assert (short < usual).any()
-
-
-def test_rewards_by_index_are_the_rewards_of_every_joint_action() -> None:
-    prediction = moving().predict()
-    np.testing.assert_array_equal(
-        prediction.reward_table(), prediction.rewards(all_joint_actions(4))
-    )
 
 
 def test_commands_are_what_the_servo_layer_commands() -> None:
@@ -146,3 +100,17 @@ def test_equivalent_robot_actions_command_the_same_wheel_speeds() -> None:
     for r in range(2):
         np.testing.assert_array_equal(speeds[r][alike[r]], speeds[r])
     assert (alike < np.arange(alike.shape[1])).any()
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"state_space": "paper"}, {"robots": 1}, {"predictor": "exact"}], ids=str
+)
+def test_equivalent_robot_actions_lead_to_the_same_states(settings: dict) -> None:
+    prediction = moving(**settings).predict()
+    joint = all_joint_actions(4 if "robots" not in settings else 2)[::5]
+    pairs = joint.reshape(len(joint), -1, 2) @ [4, 1]
+    first = np.take_along_axis(prediction.alike, pairs.T, axis=1).T
+    replaced = np.stack([first // 4, first % 4], axis=-1).reshape(joint.shape)
+    for agent in range(joint.shape[1]):
+        expected = prediction.states(agent, joint)
+        np.testing.assert_array_equal(prediction.states(agent, replaced), expected)

@@ -59,6 +59,7 @@ def at_once_and_one_by_one(monkeypatch, settings, options, number=12):
         ({"robots": 3, "state_space": "crowd"}, {"order": SIX}),
         ({"robots": 3, "state_space": "relational"}, {"rules": PRODUCTS}),
         ({"robots": 1, "state_space": "pose"}, {}),
+        ({"robots": 2, "state_space": "paper"}, {}),
         ({"robots": 5, "state_space": "crowd", "box": "rectangle"}, {}),
         ({"robots": 24, "state_space": "crowd"}, {}),
         ({"robots": 70, "state_space": "crowd"}, {"weights": "own"}),
@@ -77,7 +78,6 @@ def test_the_same_joint_actions(settings, options, monkeypatch) -> None:
 @pytest.mark.parametrize(
     ("settings", "options"),
     [
-        ({"robots": 2, "state_space": "paper"}, {}),
         ({"robots": 2, "predictor": "exact", "state_space": "crowd"}, {}),
         ({"robots": 2}, {"rules": RuleBaseSettings(membership="sigmoid")}),
         ({"robots": 3}, {"order": [*SIX[::2], *SIX[1::2]]}),

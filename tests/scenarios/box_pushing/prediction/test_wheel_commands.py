@@ -3,12 +3,10 @@
 from itertools import product
 
 import numpy as np
-import pytest
 
 from nested_agents.scenarios.box_pushing.prediction.wheel_commands import (
     robot_actions,
     speeds_of,
-    twist_table,
     wheel_commands_of,
 )
 
@@ -39,19 +37,3 @@ def test_robot_actions_are_digits_in_base_a() -> None:
     commands = wheel_commands_of(COMMANDS, np.array([EFFECT, EFFECT]))
     speeds = speeds_of(robot_actions(joint, 2, 4), commands.speeds)
     np.testing.assert_array_equal(speeds.T[0], [0.13, -0.065, 0.13, 0.0])
-
-
-@pytest.mark.parametrize("merge", [False, True])
-@pytest.mark.parametrize("effect", [EFFECT, SKID])
-def test_the_table_holds_the_twists_of_every_joint_action(effect: np.ndarray, merge: bool) -> None:
-    commands = wheel_commands_of(COMMANDS, np.array([effect, effect]))
-    joint = np.indices((4,) * 4).reshape(4, -1).T
-    choices, rows = twist_table(commands, merge)
-    kinds = [len(set(alike.tolist())) for alike in commands.alike]
-    if merge and effect is SKID:
-        assert choices.shape[1] < np.prod(kinds)
-    else:
-        assert choices.shape[1] == np.prod(kinds)
-    robots = np.arange(2)[:, None]
-    expected = commands.twists[robots, robot_actions(joint, 2, 4)]
-    np.testing.assert_allclose(commands.twists[robots, choices[:, rows]], expected, atol=1e-10)

@@ -42,8 +42,7 @@ def test_functions_fill_the_space_they_describe(name: str) -> None:
     spec = STATE_SPACES[name]
     poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
     batch = batch_of(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE)
-    own = spec.own(poses[:, 0], poses[:, 0, 0], GOAL)
-    assert own.shape == (5, spec.space.n_own)
+    assert spec.space.n_own == 1
     assert spec.shared(batch, [1])[0].shape == (5, spec.space.n_variables - spec.space.n_own)
 
 
@@ -112,16 +111,12 @@ def test_a_single_robot_has_no_others() -> None:
 
 def test_equation_1_by_hand() -> None:
     # The robot looks west; the goal (1, 0) is 2 m north of it, the box 3 m west.
-    at = np.array([[1.0, -2.0, pi]]), np.array([0.05]), GOAL
-    own = STATE_SPACES["paper"].own(*at)[0]
-    np.testing.assert_allclose(own, [-pi, -pi / 2, 2.0, 0.05], atol=1e-12)
-    seen = shared(situation([[1.0, -2.0, pi]], [-2.0, -2.0, 0.3], [0.1]), 0)
-    assert seen["heading"] == pytest.approx(-pi)
-    assert seen["box_bearing"] == pytest.approx(0.0)
-    assert seen["robot_box_distance"] == pytest.approx(3.0)
-    batch = situation([[0, 0, 0]], [1.0, 1.0, 0.2], [0.1])
+    batch = situation([[1.0, -2.0, pi]], [-2.0, -2.0, 0.3], [0.1])
+    of_box = [0.3, np.arctan2(2.0, 3.0) - 0.3, np.hypot(2.0, 3.0)]
     found = STATE_SPACES["paper"].shared(batch, [0])[0][0]
-    np.testing.assert_allclose(found, [0.2, -pi / 2 - 0.2, 1.0], atol=1e-12)
+    np.testing.assert_allclose(found, [-pi, -pi / 2, 2.0, *of_box], atol=1e-12)
+    found = STATE_SPACES["paper-box"].shared(batch, [0])[0][0]
+    np.testing.assert_allclose(found, [-pi, 0.0, 3.0, *of_box], atol=1e-12)
 
 
 def test_mirrored_worlds_have_mirrored_angles() -> None:

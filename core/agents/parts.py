@@ -1,0 +1,155 @@
+"""Parts of a team, which may begin with what a saved team has learned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from ..hierarchy.hierarchy import Hierarchy
+from ..interface.agents import (
+    AgentContext,
+    Agents,
+    Counts,
+    ReportsResources,
+    StateDict,
+    select_prefix,
+)
+from ..interface.scenario import Scenario
+from ..numerics import AnyArray
+from ..plugins import sources
+
+if TYPE_CHECKING:
+    from ..learners.learner import TeamSettings
+
+OF_A_RUN = ("generator", "explorer", "seen", "given")
+"""Saved arrays that belong to a run, not to what a team has learned."""
+
+
+def build_parts(
+    settings: TeamSettings,
+    scenario: Scenario,
+    hierarchy: Hierarchy,
+    seed: np.random.SeedSequence,
+    *,
+    messages_fail: bool,
+) -> tuple[tuple[Agents[Any], ...], list[int]]:
+    """Return the parts of a team, and the index of the part of every agent.
+
+    Raises
+    ------
+    ValueError
+        If the settings do not fit the scenario; one line.
+    """
+    kinds = settings.members(scenario, hierarchy)
+    seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
+    parts: list[Agents[Any]] = []
+    part_of = [0] * len(hierarchy)
+    for (members, own, kept), own_seed in zip(kinds, seeds, strict=True):
+        for agent in members.tolist():
+            part_of[agent] = len(parts)
+        context = AgentContext(scenario, hierarchy, members, own_seed, messages_fail)
+        parts.append(own.agents(context))
+        if kept is not None:
+            begin_with(parts[-1], kept, len(parts) - 1)
+    return tuple(parts), part_of
+
+
+def counts_of(parts: Sequence[Agents[Any]]) -> Counts:
+    """Return the number of evaluations of the parts that count them."""
+    total = Counts()
+    for part in parts:
+        if isinstance(part, ReportsResources):
+            total.add(part.counts)
+    return total
+
+
+def weight_bytes_of(parts: Sequence[Agents[Any]]) -> int:
+    """Return the memory of the learned weights of all parts [bytes]."""
+    return sum(
+        part.weight_bytes
+        if isinstance(part, ReportsResources)
+        else sum(array.nbytes for array in part.state_dict().values())
+        for part in parts
+    )
+
+
+def state_of(parts: Sequence[Agents[Any]]) -> StateDict:
+    """Return the saved state of all parts as named arrays."""
+    if len(parts) == 1:
+        return parts[0].state_dict()
+    return {
+        f"part{k}.{name}": array
+        for k, part in enumerate(parts)
+        for name, array in part.state_dict().items()
+    }
+
+
+def load_state(parts: Sequence[Agents[Any]], state: Mapping[str, AnyArray]) -> None:
+    """Continue all parts from what `state_of` returned.
+
+    Raises
+    ------
+    ValueError
+        If it is the state of other agents.
+    """
+    for k, part in enumerate(parts):
+        own = state if len(parts) == 1 else select_prefix(f"part{k}.", state)
+        part.load_state_dict(own)
+
+
+def begin_with(agents: Agents[Any], file: str, part: int) -> None:
+    """Initialize the agents of a part with the weights of a saved team.
+
+    Random numbers, exploration and counts of actions stay those of the agents. The learner may
+    differ if the weights fit: ``frozen`` can use those of ``batch-td``.
+
+    Parameters
+    ----------
+    agents
+        Agents, modified.
+    file
+        Name of the team's file, as in a spec.
+    part
+        Index of the part.
+
+    Raises
+    ------
+    ValueError
+        If the file has no weights that fit these agents; one line.
+    """
+    where = f"learner.parts[{part}].team = {file!r}"
+    try:
+        with np.load(BytesIO(sources.active().content(file)), allow_pickle=False) as arrays:
+            kept = dict(arrays)
+    except (OSError, ValueError, BadZipFile) as error:
+        raise ValueError(f"{where}: {error}") from None
+    kept = select_prefix(f"part{part}.", kept) or kept
+    own = agents.state_dict()
+    learned = _learned(own) & kept.keys()
+    if not learned:
+        content = ", ".join(sorted(kept)) or "nothing"
+        raise ValueError(f"{where}: contains no weights of this learner, but {content}")
+    for name in sorted(learned):
+        _check_shape(where, name, kept[name], own)
+    try:
+        agents.load_state_dict({**own, **{name: kept[name] for name in learned}})
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{where}: {error}") from None
+
+
+def _learned(memory: StateDict) -> set[str]:
+    return {name for name in memory if name not in OF_A_RUN}
+
+
+def _check_shape(where: str, name: str, kept: AnyArray, own: Mapping[str, AnyArray]) -> None:
+    """Refuse weights of another shape; arrays that grow with experience may have any length."""
+    is_weights = name.endswith("theta")
+    if is_weights and kept.shape != own[name].shape:
+        raise ValueError(
+            f"{where}: {name} has shape {kept.shape}, these agents need {own[name].shape}; "
+            "with learner.weights = 'role', teams of other sizes can share weights"
+        )
