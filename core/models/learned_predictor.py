@@ -103,19 +103,24 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
                 f"learner.predictor: needs {k * rules * min(b, 2)} regression features, allowed "
                 f"{MAX_FEATURES}; reduce products or memberships"
             )
+        seen = np.where(self.periods > 0.0, [low, high], [[np.inf], [-np.inf]])
+        self.memory = self._empty_memory(k, rules, v) | {"seen": seen}
+
+    def _empty_memory(self, k: int, rules: int, v: int) -> dict[str, FloatArray]:
+        """Return sums and weights before any experience, for k inputs, rules and v variables."""
+        n_own = self.space.n_own
         r = self.own_rules.n_rules if self.own_rules else 0
         of_own = (self.kinds.max() + 1, self.n_actions, r)
         f = k * rules
-        self.memory = {
+        return {
             "own_gram": np.zeros((*of_own, r)),
-            "own_moment": np.zeros((*of_own, space.n_own)),
-            "own_weights": np.zeros((*of_own, space.n_own)),
+            "own_moment": np.zeros((*of_own, n_own)),
+            "own_weights": np.zeros((*of_own, n_own)),
             "gram": np.zeros((3, f, f)),
             "moment": np.zeros((2, f, 2 * v)),
             "squares": np.zeros(2 * v),
             "weights": np.zeros((k, rules, 2 * v)),
             "keep": np.ones(v),
-            "seen": np.where(self.periods > 0.0, [low, high], [[np.inf], [-np.inf]]),
         }
 
     def predict(self, states: FloatArray) -> LearnedPrediction:
