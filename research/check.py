@@ -29,6 +29,8 @@ MIN_SEEDS = 3
 """Fewest seeds for which an interval says anything."""
 ENOUGH_SEEDS = 10
 """Seeds of which no more are needed to prefer a condition to those listed before it."""
+LAST_DIGIT = 0.01
+"""Last digit that is printed, to which bounds are rounded outward."""
 HEADER = (
     "| table | condition | seeds | measure | published | new | |",
     "|---|---|---|---|---|---|---|",
@@ -126,8 +128,9 @@ def estimates(results: Results, condition: str) -> dict[str, Estimate]:
 
 
 def agree(published: Estimate, new: Estimate) -> bool:
-    """Return whether each of two estimates lies in the interval of the other."""
-    return new.low <= published.value <= new.high and published.low <= new.value <= published.high
+    """Return whether each of two estimates lies in the interval of the other, as printed."""
+    pairs = ((published, new), (new, published))
+    return all(other.low - LAST_DIGIT < own.value < other.high + LAST_DIGIT for own, other in pairs)
 
 
 def lines(rerun: PublishedCondition, out: Path, jobs: int | None) -> Iterator[str]:

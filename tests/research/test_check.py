@@ -88,6 +88,7 @@ def test_estimates_agree_if_each_lies_in_the_interval_of_the_other():
     assert check.agree(wide, Estimate(0.6, 0.4, 0.9))
     assert not check.agree(wide, narrow)
     assert not check.agree(narrow, wide)
+    assert check.agree(Estimate(0.983, 0.661, 0.996), Estimate(1.0, 0.6, 1.0))  # printed as 1.00
 
 
 @pytest.mark.parametrize("name", ["aloha", "edges", "related-boxes"])
