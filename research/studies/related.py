@@ -61,7 +61,7 @@ def measure(trial: Trial) -> TrialResult:
     session = Session(trial)
     session.train(trial.episodes)
     team = session.team.only(FuzzyAgents)
-    hierarchy = team.hierarchy
+    hierarchy = session.team.hierarchy
     n_rules = team.learner.theta.shape[1]
     tried = 0 if team.evaluator is None else hierarchy.count_joint_actions(len(team.action_set))
     counted = team.counts.rule_evaluations

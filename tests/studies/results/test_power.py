@@ -234,7 +234,7 @@ def test_what_independent_runs_detect_is_found_as_often_as_promised(counts, comp
     rng = np.random.default_rng(0)
     found = [
         independent_permutation(rng.normal(effect, size=counts[0]), rng.normal(size=counts[1]))
-        for _ in range(120)
+        for _ in range(60)
     ]
     share = np.mean(np.array(found) * comparisons < LEVEL)
     assert share == pytest.approx(0.8, abs=0.1)
