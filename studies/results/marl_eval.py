@@ -44,6 +44,8 @@ STEP = re.compile(r"step_0*(\d+)", re.IGNORECASE | re.ASCII)
 """Key of a step."""
 ABSOLUTE = "absolute_metrics"
 STEP_COUNT = "step_count"
+PHASES = ("training", "evaluation")
+"""Phases that a file can hold."""
 SEED = "seed_"
 """Prefix of a run's name, before its seed."""
 STEPS = "steps"
@@ -97,7 +99,7 @@ def _exported_runs(results: Results, condition: str) -> Iterator[tuple[str, dict
             for name in names
             if results.has(condition, phase, name)
         }
-        for phase in ("training", "evaluation")
+        for phase in PHASES
         if results.has(condition, phase)
     }
     for seed in results.seeds(condition):

@@ -50,6 +50,13 @@ def said(capsys, *arguments):
     return capsys.readouterr().out
 
 
+def test_an_export_names_the_phases_that_its_form_cannot_hold(study, tmp_path, capsys):
+    for form in ("csv", "marl-eval"):
+        assert main(["export", str(study), "--out", str(tmp_path), "--format", form]) == 0
+        left_out = "training:two, training:three, evaluation:six, evaluation:eight"
+        assert (f"left out: {left_out}" in capsys.readouterr().err) == (form == "marl-eval")
+
+
 def test_stages_are_kept_in_the_order_in_which_they_were_trained(study):
     with Store.open(study) as store:
         names, rows = store.episodes()
