@@ -260,8 +260,8 @@ def _contents(store: Store, form: Files, folder: Path) -> dict[str, bytes]:
     frames = {"episodes": results.episodes, "trials": results.trials}
     if form == "marl-eval":
         if others := [name for name in results.phases if name not in marl_eval.PHASES]:
-            kept = " and ".join(marl_eval.PHASES)
-            say(f"marl-eval: holds {kept} only; left out: {', '.join(others)}")
+            allowed = " and ".join(marl_eval.PHASES)
+            say(f"marl-eval: holds {allowed} only; left out: {', '.join(others)}")
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
         files = {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study).encode()}
     elif form == "csv":
