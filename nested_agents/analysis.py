@@ -57,7 +57,7 @@ from .studies.results.statistics import (
     rate,
     stack_estimates,
 )
-from .studies.spec.tables import label, label_but
+from .studies.spec.tables import column_value, label, label_but
 
 __all__ = [
     "AFTER",
@@ -84,6 +84,7 @@ __all__ = [
     "adjust",
     "analyse_as",
     "bootstrap",
+    "column_value",
     "compare_conditions",
     "compare_hierarchies",
     "compare_with_first",

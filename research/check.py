@@ -18,7 +18,14 @@ from typing import Any
 import numpy as np
 
 import nested_agents as na
-from nested_agents.analysis import Estimate, Results, estimate_of, evaluated, format_estimate
+from nested_agents.analysis import (
+    Estimate,
+    Results,
+    column_value,
+    estimate_of,
+    evaluated,
+    format_estimate,
+)
 from nested_agents.terminal import print_lines, run_to_status
 
 from . import RESULTS, load
@@ -86,7 +93,8 @@ def select_condition(spec: Spec, column: Spec) -> dict[str, Any]:
         for override in spec.get("overrides", [])
         if override["name"] == column["name"]
         and all(
-            column[key] in map(told, values) for key, values in override.get("sweep", {}).items()
+            column[key] in map(column_value, values)
+            for key, values in override.get("sweep", {}).items()
         )
     ]
     selected = narrow_sweep(spec, column) | {"overrides": matching}
@@ -107,17 +115,10 @@ def with_full_paths(spec: Spec) -> dict[str, Any]:
 def narrow_sweep(table: Spec, column: Spec) -> dict[str, Any]:
     """Return a table whose swept keys have the one value of a condition."""
     narrowed = {
-        key: [value for value in values if told(value) == column[key]] or [column[key]]
+        key: [value for value in values if column_value(value) == column[key]] or [column[key]]
         for key, values in table.get("sweep", {}).items()
     }
     return dict(table, sweep=narrowed)
-
-
-def told(value: object) -> object:
-    """Return a swept value as columns show it: numbers as they are, all else as text."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return value if isinstance(value, int | float) else str(value)
 
 
 def estimates(results: Results, condition: str) -> dict[str, Estimate]:

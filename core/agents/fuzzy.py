@@ -27,7 +27,7 @@ from ..plugins.words import must_inherit
 from ..search.evaluator import Aggregation, DecisionContext, Evaluator
 from ..search.exploration import Explorer
 from .action_counts import ActionCounts
-from .valuing import TeamSearch
+from .team_search import TeamSearch
 from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
 
 

@@ -23,17 +23,17 @@ from ..interface.scenario import Scenario, Transition, prediction_of
 from ..learners.fitted_q import FittedQSettings
 from ..learners.learner import TeamSettings
 from ..numerics import FloatArray, IntArray
+from ..search.evaluator import NO_AGENTS
 from .fuzzy import FuzzyAgents
 from .views import FuzzyInputs
 
-NO_MESSAGES = np.zeros(0, np.int64)
-INBOX = Inbox(np.zeros(1, np.int64), NO_MESSAGES, NO_MESSAGES, NO_MESSAGES)
+INBOX = Inbox(np.zeros(1, np.int64), NO_AGENTS, NO_AGENTS, NO_AGENTS)
 """A leader has no superior that sends it messages."""
 
 
 @contextmanager
 def keys_below(table: str) -> Iterator[None]:
-    """Name the keys of a learner by the table that its table lies in, when they are refused."""
+    """Put the name of the enclosing table before the keys of a learner in error messages."""
     try:
         yield
     except ValueError as error:
@@ -110,7 +110,7 @@ class Leader:
     def lead(
         self, observation: Observation, *, explore: bool
     ) -> tuple[Observation, IntArray | None]:
-        """Decide on an option if none goes on.
+        """Choose an option when none is running.
 
         Returns
         -------
@@ -120,8 +120,8 @@ class Leader:
             Their actions ``(n,)``, if a given skill acts for them.
         """
         options = self._options
-        goes_on = 0 < self._duration < options.limit and options.advance()
-        if not goes_on:
+        is_running = 0 < self._duration < options.limit and options.advance()
+        if not is_running:
             states = options.begin(self._decide(explore=explore))
             observation = observation._replace(states=states)
             if self._needs_prediction:  # an option that begins changes what is predicted

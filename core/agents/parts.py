@@ -1,4 +1,4 @@
-"""Parts of a team, which may begin with what a saved team has learned."""
+"""Parts of a team, which can start from the weights of a saved team."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
 
 OF_A_RUN = ("generator", "explorer", "seen", "given")
-"""Saved arrays that belong to a run, not to what a team has learned."""
+"""Saved arrays that belong to a run and are no learned weights."""
 
 
 def build_parts(

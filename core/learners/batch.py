@@ -65,7 +65,7 @@ def solver(gram: FloatArray) -> Function:
 
 
 class Outcomes(NamedTuple):
-    """What followed the N after-states of a row."""
+    """Rewards and successors of the N after-states of a weight row."""
 
     rewards: FloatArray
     """``(N,)`` rewards."""

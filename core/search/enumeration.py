@@ -113,7 +113,7 @@ class _JointOutcomes:
 
     @cached_property
     def states(self) -> list[FloatArray]:
-        """By agent, predicted states ``(m, d)``."""
+        """Predicted states ``(m, d)`` of every agent."""
         groups = self.problem.groups
         n_own = self.problem.rules.n_own
         own, shared = states_by_group(self.prediction, self.distinct, groups, n_own)
@@ -147,9 +147,10 @@ class ExactEnumeration(Aggregation):
         self._every: IntArray | None = None
         """``(A ** n, n)`` all joint actions, if all are predicted at once."""
         self._indices: list[IntArray] = []
-        """By agent, contributions of its own and lower actions to the joint-action index."""
+        """For every agent, what its own and lower actions add to the index of a joint action."""
         self._strides: list[IntArray] = []
-        """By agent, index strides ``(n,)`` of the actions of all others, else 0."""
+        """For every agent, strides ``(n,)`` of the actions of all others in that index, and 0 for
+        its own and those below."""
         self._last: _JointOutcomes | None = None
         if a**n <= min(self.hierarchy.count_joint_actions(a), MAX_JOINT_ACTIONS):
             self._every = combinations(tuple(range(n)), a)

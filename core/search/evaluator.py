@@ -39,7 +39,7 @@ NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
 """Empty conditional frequencies."""
 NO_STATES: FloatArray = np.zeros((0, 0))
 """An empty array of states."""
-NOBODY: IntArray = np.zeros(0, dtype=np.int64)
+NO_AGENTS: IntArray = np.zeros(0, dtype=np.int64)
 """An empty array of agents."""
 
 
@@ -62,7 +62,7 @@ class DecisionContext(NamedTuple):
     given: FloatArray = NOTHING_GIVEN
     """``(A, n, A)`` the same frequencies given each action of the deciding agent. Empty unless the
     teammate model is ``conditional``."""
-    told: IntArray = NOBODY
+    told: IntArray = NO_AGENTS
     """``(k,)`` agents whose actions it was told."""
     present: FloatArray = NO_STATES
     """``(n, d)`` present states of all agents. Learners of action values append the actions that

@@ -28,6 +28,7 @@ from .results import Results
 from .scores import (
     KEYS,
     LAST_STEP,
+    PHASES,
     WHOLE,
     Better,
     ScoreResults,
@@ -44,8 +45,6 @@ STEP = re.compile(r"step_0*(\d+)", re.IGNORECASE | re.ASCII)
 """Key of a step."""
 ABSOLUTE = "absolute_metrics"
 STEP_COUNT = "step_count"
-PHASES = ("training", "evaluation")
-"""Phases that a file can hold."""
 SEED = "seed_"
 """Prefix of a run's name, before its seed."""
 STEPS = "steps"

@@ -186,7 +186,7 @@ class Header(BaseModel):
         except ValidationError as error:
             raise ValueError(explain(error, file)) from None
         if isinstance(file, dict):
-            header._is_changed = header.sha256 not in (None, checksum(file))
+            header._is_changed = header.sha256 is not None and header.sha256 != checksum(file)
         return header
 
     @classmethod
@@ -227,8 +227,9 @@ class Header(BaseModel):
         known = self.files.get(path.name)
         if known is None and self.files:
             return (*notes, f"is not among the files that {HEADER} lists")
-        is_changed = known not in (None, hashlib.sha256(path.read_bytes()).hexdigest())
-        return (*notes, *[f"{CHANGED}, says {HEADER}"] * is_changed)
+        if known is None or known == hashlib.sha256(path.read_bytes()).hexdigest():
+            return notes
+        return (*notes, f"{CHANGED}, says {HEADER}")
 
     def limited(self, results: Results) -> Results:
         """Return results with the limits of the spec."""

@@ -22,7 +22,7 @@ from .score_tables import NUMBER, ScoreTable
 KEYS = ["condition", "phase", "seed", "episode"]
 """Columns that name a score."""
 PHASES = ("training", "evaluation")
-"""Phases that come before all others."""
+"""Phases that come before all others. A file in the form of marl-eval can hold these only."""
 LAST_STEP = "last step"
 """Phase of the scores at the last common step, where a file has other phases, too."""
 NAMED_RUNS = 3
@@ -146,7 +146,7 @@ def at_last_step(scores: pd.DataFrame, step_name: str) -> tuple[pd.DataFrame, st
     scores
         A row for each score of the measure in one phase, with the columns condition, seed and step.
     step_name
-        What a step is called in the note.
+        Name of a step in the note.
     """
     step = last_common_step(scores)
     if step is None:

@@ -297,8 +297,8 @@ def _place(law: UniversalLaw, largest: float, size: str) -> str:
         )
     if value > largest:
         return (
-            "the team of maximum throughput may be larger than the sizes measured: more than "
-            f"{math.floor(low)} {size}"
+            f"the team of maximum throughput has more than {math.floor(low)} {size}, and may be "
+            "larger than those measured"
         )
     if math.isinf(high):
         return (

@@ -16,7 +16,7 @@ from .data import COSTS, Place
 LAW_POINTS = 60
 """Points of the line of a law."""
 MAX_EFFICIENCY = 1.2
-"""Efficiency that its axis shows at least; intervals beyond the largest value are cut."""
+"""Efficiency that its axis always shows."""
 
 
 def draw(analysis: Scalability) -> Figure:
@@ -58,8 +58,8 @@ def _draw_cells(axes: Axes, analysis: Scalability, estimates: Mapping[Place, Est
 
 
 def _draw_efficiency(axes: Axes, analysis: Scalability) -> None:
-    """Draw efficiencies; the axis ends above the largest, because intervals may be very wide."""
-    largest = MAX_EFFICIENCY
+    """Draw efficiencies; intervals are cut at twice the largest value, as they may be very wide."""
+    largest = highest = MAX_EFFICIENCY
     for index, name in enumerate(analysis.data.hierarchies):
         own = [
             (size, speedup.efficiency) for size, speedup in analysis.speedups.get(name, {}).items()
@@ -67,9 +67,10 @@ def _draw_efficiency(axes: Axes, analysis: Scalability) -> None:
         _draw_line(axes, analysis, index, [size for size, _ in own], [e for _, e in own])
         _draw_law(axes, analysis, index, name)
         largest = max([largest, *(float(e.value) for _, e in own if np.isfinite(e.value))])
+        highest = max([highest, *(float(e.high) for _, e in own if np.isfinite(e.high))])
     axes.axhline(1.0, color="#888888", linewidth=0.8, ls=":")
     axes.set_ylabel(f"efficiency ({analysis.data.scaling} scaling)")
-    axes.set_ylim(0.0, 1.1 * largest)
+    axes.set_ylim(0.0, 1.1 * min(highest, 2.0 * largest))
 
 
 def _draw_law(axes: Axes, analysis: Scalability, index: int, name: str) -> None:

@@ -24,7 +24,7 @@ from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
 from .controls import LEARN_NOTHING, for_control
 from .presets import PRESETS, Preset
-from .tables import SWEEP, SpecTable, TomlTable, flat, label, merge, nested, override, scalar
+from .tables import SWEEP, SpecTable, TomlTable, column_value, flat, label, merge, nested, override
 
 SECTIONS = ("scenario", "topology", "learner")
 """Tables that describe a condition."""
@@ -166,7 +166,7 @@ def _condition(
         for other, changes in spec.evaluations.items()
     ]
     columns: Point = {"name": table.name} if table else {}
-    columns |= {key: scalar(point[key]) if key in point else "" for key in keys}
+    columns |= {key: column_value(point[key]) if key in point else "" for key in keys}
     columns = columns or {"preset": spec.preset}
     return Condition(name, columns, settings, tuple(evaluations), tuple(stages))
 

@@ -228,7 +228,7 @@ def _brief(value: object) -> str:
     >>> _brief({"name": "kite", **kite}), _brief(kite), _brief({"branching": 2})
     ('kite', 'described e5dea0', '{branching = 2}')
     """
-    text = str(scalar(value))
+    text = str(column_value(value))
     if isinstance(value, Mapping):
         if "name" in value:
             return str(value["name"])
@@ -243,7 +243,7 @@ def _checksum(text: str) -> str:
     return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:6]
 
 
-def scalar(value: object) -> object:
+def column_value(value: object) -> object:
     """Return a value for a column: numbers and text unchanged, others in TOML."""
     is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
     return value if is_scalar else show(value, width=None)

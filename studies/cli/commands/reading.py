@@ -250,6 +250,7 @@ def _contents(store: Store, form: Files, folder: Path) -> dict[str, bytes]:
     from ...presentation.tables import in_csv, in_parquet
     from ...results import headers, marl_eval, published
     from ...results.results import read
+    from ...results.scores import PHASES
 
     results = read(store)
     outline = StudyOutline.kept(store)
@@ -259,8 +260,8 @@ def _contents(store: Store, form: Files, folder: Path) -> dict[str, bytes]:
         return {"results.json": published.dumps(outline, kept).encode()}
     frames = {"episodes": results.episodes, "trials": results.trials}
     if form == "marl-eval":
-        if others := [name for name in results.phases if name not in marl_eval.PHASES]:
-            allowed = " and ".join(marl_eval.PHASES)
+        if others := [name for name in results.phases if name not in PHASES]:
+            allowed = " and ".join(PHASES)
             say(f"marl-eval: holds {allowed} only; left out: {', '.join(others)}")
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
         files = {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study).encode()}

@@ -11,7 +11,7 @@ from ..learners.learner import LearnerSettings
 from ..numerics import IntArray
 from ..plugins.words import must_inherit
 from ..search.budget import check_budget
-from ..search.evaluator import NOBODY, DecisionProblem, Evaluator, ValueOf, concerned
+from ..search.evaluator import NO_AGENTS, DecisionProblem, Evaluator, ValueOf, concerned
 from ..values.rule_base import RuleBase
 
 
@@ -59,8 +59,8 @@ class TeamSearch:
         self._context = context
         self._is_checked = False
         self.hierarchy = context.hierarchy
-        self.left = NOBODY
-        self.actions_of_left = NOBODY
+        self.left = NO_AGENTS
+        self.actions_of_left = NO_AGENTS
         is_partial = isinstance(context.scenario, PartiallyObserved)
         self.is_private = is_partial or settings.decision.errors is not None
         self.evaluator = self._build()
