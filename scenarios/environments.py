@@ -23,6 +23,7 @@ from ..core.interface.abilities import Recorded, measurements_of
 from ..core.interface.recording import EpisodeRecorder
 from ..core.interface.scenario import Scenario, Transition
 from ..core.numerics import FloatArray, IntArray
+from .library_types import Options
 
 Observations = dict[str, FloatArray]
 """Observations by agent."""
@@ -124,7 +125,7 @@ class Environment(ABC):
     def _teams(self) -> Mapping[str, Sequence[int]]:
         """Return the indices of the agents of each player, by name."""
 
-    def begin(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
+    def begin(self, seed: int | None, options: Options) -> FloatArray:
         """Start the next episode; a seed resets the stream of episode seeds and their count.
 
         The option ``episode`` sets the number of the episode, which schedules failures. The option
@@ -211,9 +212,7 @@ class AgentsEnv(Environment, ParallelEnv):
         """Return the space of an agent's actions."""
         return self.players[agent].action_space
 
-    def reset(
-        self, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[Observations, Infos]:
+    def reset(self, seed: int | None = None, options: Options = None) -> tuple[Observations, Infos]:
         """Start an episode, see `Environment.begin`; return observations and infos by agent."""
         return self._observe(self.begin(seed, options), measurements_of(self.scenario))
 

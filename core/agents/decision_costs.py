@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-from ..interface.agents import Agents, ReportsCosts
+from ..interface.agents import AnyAgents, ReportsCosts
 from ..interface.measures import Measure
 from ..numerics import IntArray
 
@@ -34,7 +33,7 @@ class DecisionCosts:
         If two parts report one cost in different units; one line.
     """
 
-    def __init__(self, parts: Sequence[Agents[Any]], *, counts_messages: bool) -> None:
+    def __init__(self, parts: Sequence[AnyAgents], *, counts_messages: bool) -> None:
         self._parts = {k: p for k, p in enumerate(parts) if isinstance(p, ReportsCosts)}
         sent = [MESSAGES] if counts_messages else []
         own = [measure for part in self._parts.values() for measure in part.costs]

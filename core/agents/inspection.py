@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from ..hierarchy.stages import Inbox
-from ..interface.agents import Agents, Inspectable, RecordsValues
+from ..interface.agents import AnyAgents, Inspectable, RecordsValues
 from ..interface.experience import AgentDecision, Decision
 from ..numerics import SAME, FloatArray, IntArray
 from ..plugins.words import expect
@@ -62,16 +61,14 @@ def inspect_agents(
     return tuple(decisions)
 
 
-def record_values(parts: Sequence[Agents[Any]], inputs: Sequence[object]) -> None:
+def record_values(parts: Sequence[AnyAgents], inputs: Sequence[object]) -> None:
     """Let the parts of a team keep the values of actions in this decision."""
     for part, own in zip(parts, inputs, strict=True):
         if isinstance(part, RecordsValues):
             part.record_values(own)
 
 
-def recorded_values(
-    parts: Sequence[Agents[Any]], inputs: Sequence[object]
-) -> dict[int, FloatArray]:
+def recorded_values(parts: Sequence[AnyAgents], inputs: Sequence[object]) -> dict[int, FloatArray]:
     """Return the values ``(A,)`` of the actions of every agent that has them."""
     values: dict[int, FloatArray] = {}
     for part, own in zip(parts, inputs, strict=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from zipfile import BadZipFile
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import (
     AgentContext,
-    Agents,
+    AnyAgents,
     Counts,
     ReportsResources,
     StateDict,
@@ -36,7 +36,7 @@ def build_parts(
     seed: np.random.SeedSequence,
     *,
     messages_fail: bool,
-) -> tuple[tuple[Agents[Any], ...], list[int]]:
+) -> tuple[tuple[AnyAgents, ...], list[int]]:
     """Return the parts of a team, and the index of the part of every agent.
 
     Raises
@@ -46,7 +46,7 @@ def build_parts(
     """
     kinds = settings.members(scenario, hierarchy)
     seeds = [seed] if len(kinds) == 1 else seed.spawn(len(kinds))
-    parts: list[Agents[Any]] = []
+    parts: list[AnyAgents] = []
     part_of = [0] * len(hierarchy)
     for (members, own, kept), own_seed in zip(kinds, seeds, strict=True):
         for agent in members.tolist():
@@ -58,7 +58,7 @@ def build_parts(
     return tuple(parts), part_of
 
 
-def counts_of(parts: Sequence[Agents[Any]]) -> Counts:
+def counts_of(parts: Sequence[AnyAgents]) -> Counts:
     """Return the number of evaluations of the parts that count them."""
     total = Counts()
     for part in parts:
@@ -67,7 +67,7 @@ def counts_of(parts: Sequence[Agents[Any]]) -> Counts:
     return total
 
 
-def weight_bytes_of(parts: Sequence[Agents[Any]]) -> int:
+def weight_bytes_of(parts: Sequence[AnyAgents]) -> int:
     """Return the memory of the learned weights of all parts [bytes]."""
     return sum(
         part.weight_bytes
@@ -77,7 +77,7 @@ def weight_bytes_of(parts: Sequence[Agents[Any]]) -> int:
     )
 
 
-def state_of(parts: Sequence[Agents[Any]]) -> StateDict:
+def state_of(parts: Sequence[AnyAgents]) -> StateDict:
     """Return the saved state of all parts as named arrays."""
     if len(parts) == 1:
         return parts[0].state_dict()
@@ -88,7 +88,7 @@ def state_of(parts: Sequence[Agents[Any]]) -> StateDict:
     }
 
 
-def load_state(parts: Sequence[Agents[Any]], state: Mapping[str, AnyArray]) -> None:
+def load_state(parts: Sequence[AnyAgents], state: Mapping[str, AnyArray]) -> None:
     """Continue all parts from what `state_of` returned.
 
     Raises
@@ -101,7 +101,7 @@ def load_state(parts: Sequence[Agents[Any]], state: Mapping[str, AnyArray]) -> N
         part.load_state_dict(own)
 
 
-def begin_with(agents: Agents[Any], file: str, part: int) -> None:
+def begin_with(agents: AnyAgents, file: str, part: int) -> None:
     """Initialize the agents of a part with the weights of a saved team.
 
     Random numbers, exploration and counts of actions stay those of the agents. The learner may

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.messages import NO_PAYLOADS, Messages, Payloads
 from ..hierarchy.stages import DecisionStage, Inbox, decision_stages
 from ..interface.agents import (
-    Agents,
+    AnyAgents,
     Counts,
     ObservesJointActions,
     Rearrangeable,
@@ -39,7 +39,7 @@ from .parts import build_parts, counts_of, load_state, state_of, weight_bytes_of
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
 
-A = TypeVar("A", bound=Agents[Any])
+A = TypeVar("A", bound=AnyAgents)
 
 
 class Team:

@@ -89,7 +89,7 @@ class FunctionAgents(Agents[FunctionInputs]):
         self._agents = tuple(scenario.agents)
         self._actions = scenario.action_set.names
         self._variables = [variable.name for variable in scenario.state_space.variables]
-        self._function: Callable[..., Any] = LEARNERS.find(settings.kind)
+        self._function: Callable[..., object] = LEARNERS.find(settings.kind)
         self._parameters = parameters_of(settings.kind, self._function)
         own = type(settings).model_fields.keys() - FunctionSettings.model_fields.keys()
         self._options = {name: value for name, value in settings if name in own}
@@ -140,7 +140,7 @@ class FunctionAgents(Agents[FunctionInputs]):
 
     def _arguments(
         self, inputs: FunctionInputs, agent: int, received: Mapping[str, ReceivedMessage]
-    ) -> dict[str, Any]:
+    ) -> dict[str, object]:
         """Return the value of every parameter in `PARAMETERS` for one agent."""
         state = inputs.states[agent].tolist()
         counter = [0, agent, self._step, self._episode]
@@ -153,16 +153,16 @@ class FunctionAgents(Agents[FunctionInputs]):
             "step": self._step,
         }
 
-    def _call_one(self, given: Mapping[str, Any]) -> Any:
+    def _call_one(self, given: Mapping[str, object]) -> object:
         chosen = {name: given[name] for name in self._parameters}
-        return self._call(given["agent"], chosen)
+        return self._call(str(given["agent"]), chosen)
 
-    def _call_batch(self, given: Sequence[Mapping[str, Any]]) -> Sequence[Any]:
-        chosen: dict[str, Any] = {}
+    def _call_batch(self, given: Sequence[Mapping[str, object]]) -> Sequence[object]:
+        chosen: dict[str, object] = {}
         for one, many in zip(PARAMETERS, BATCH_PARAMETERS, strict=True):
             if many in self._parameters:
                 chosen[many] = given[0][one] if one in COMMON else [own[one] for own in given]
-        first = given[0]["agent"]
+        first = str(given[0]["agent"])
         answers = self._call(first, chosen)
         if not isinstance(answers, list | tuple | np.ndarray) or len(answers) != len(given):
             raise FunctionError(
@@ -171,7 +171,7 @@ class FunctionAgents(Agents[FunctionInputs]):
             )
         return list(answers)
 
-    def _call(self, agent: str, chosen: Mapping[str, Any]) -> Any:
+    def _call(self, agent: str, chosen: Mapping[str, object]) -> object:
         try:
             return self._function(**chosen, **self._options)
         except (Exception, SystemExit) as error:
@@ -230,7 +230,7 @@ class FunctionAgents(Agents[FunctionInputs]):
         """Do nothing, because functions do not learn."""
 
 
-def parameters_of(name: str, function: Callable[..., Any]) -> tuple[str, ...]:
+def parameters_of(name: str, function: Callable[..., object]) -> tuple[str, ...]:
     """Return the positional parameters of a function that decides.
 
     Raises

@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, Self, TypeVar, runtime_checkable
+from typing import Any, Generic, Protocol, Self, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from .measures import Measure
 from .scenario import Scenario
 
 I = TypeVar("I")  # noqa: E741 - inputs of a kind of agents
+Inputs: TypeAlias = Any
+"""Inputs of any kind of agents, which receive their own."""
 StateDict = dict[str, AnyArray]
 """Saved state as named arrays."""
 
@@ -129,12 +131,16 @@ class Agents(ABC, Generic[I]):
         """
 
 
+AnyAgents: TypeAlias = Agents[Any]
+"""Agents of any kind."""
+
+
 @runtime_checkable
 class Vectorized(Protocol):
     """Agents act and learn in many environments at once, with states ``(E, n, d)``."""
 
     def learn_batch(
-        self, joint_actions: IntArray, inputs: Any, steps: Transitions, last: BoolArray
+        self, joint_actions: IntArray, inputs: Inputs, steps: Transitions, last: BoolArray
     ) -> None:
         """Learn from one step of many environments.
 
@@ -155,7 +161,7 @@ class Vectorized(Protocol):
 class SendsPayloads(Protocol):
     """Messages of the agents contain more than their actions."""
 
-    def payloads(self, inputs: Any) -> Mapping[int, object]:
+    def payloads(self, inputs: Inputs) -> Mapping[int, object]:
         """Return the payloads of the messages sent so far in this decision, by agent."""
 
 
@@ -163,7 +169,7 @@ class SendsPayloads(Protocol):
 class ObservesJointActions(Protocol):
     """Agents learn about each other by their actions, in training and in evaluation."""
 
-    def conclude(self, inputs: Any, joint_action: IntArray) -> None:
+    def conclude(self, inputs: Inputs, joint_action: IntArray) -> None:
         """Receive the joint action ``(n,)`` before the step."""
 
 
@@ -192,7 +198,7 @@ class ReportsCosts(Protocol):
     costs: tuple[Measure, ...]
     """Measures of the costs of decisions."""
 
-    def decision_costs(self, inputs: Any, joint_action: IntArray) -> Mapping[str, float]:
+    def decision_costs(self, inputs: Inputs, joint_action: IntArray) -> Mapping[str, float]:
         """Return the costs of a decision by the names of `costs`."""
 
 
@@ -213,7 +219,7 @@ class ReportsResources(Protocol):
 class Inspectable(Protocol):
     """The values by which the agents decide can be shown."""
 
-    def action_values(self, inputs: Any) -> Mapping[int, FloatArray]:
+    def action_values(self, inputs: Inputs) -> Mapping[int, FloatArray]:
         """Return the values ``(A,)`` of the actions of each member after a decision.
 
         Policies return the log probabilities of actions.
@@ -224,7 +230,7 @@ class Inspectable(Protocol):
 class RecordsValues(Protocol):
     """Agents keep the values of actions only in a decision that is inspected."""
 
-    def record_values(self, inputs: Any) -> None:
+    def record_values(self, inputs: Inputs) -> None:
         """Keep the values of actions in this decision, for `Inspectable.action_values`."""
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from abc import ABC
 from collections.abc import Mapping
 from pkgutil import resolve_name
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.agents import AgentContext, Agents
+from ..interface.agents import AgentContext, AnyAgents
 from ..interface.scenario import Scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..models.calibration import CalibrationSettings
@@ -148,7 +148,7 @@ class TeamSettings(PartSettings):
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
     """Discount per decision, gamma of Eq. 7: low for immediate rewards, high for delayed ones."""
 
-    def agents(self, context: AgentContext) -> Agents[Any]:
+    def agents(self, context: AgentContext) -> AnyAgents:
         """Return the agents for a scenario and a hierarchy.
 
         Raises
@@ -156,7 +156,7 @@ class TeamSettings(PartSettings):
         ValueError
             If they cannot act there.
         """
-        agents: Agents[Any] = resolve_name(self.kind_of_agents)(self, context)
+        agents: AnyAgents = resolve_name(self.kind_of_agents)(self, context)
         return agents
 
     def members(self, scenario: Scenario, hierarchy: Hierarchy) -> list[MembersOf]:

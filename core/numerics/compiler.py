@@ -32,11 +32,14 @@ from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from time import perf_counter
 from types import CodeType, FunctionType
-from typing import IO, Any, TypeVar, cast
+from typing import IO, Any, TypeAlias, TypeVar, cast
 
 from ..isolation import python_command
 
-F = TypeVar("F", bound=Callable[..., Any])
+Function: TypeAlias = Callable[..., Any]
+Dispatcher: TypeAlias = Any
+"""Numba's compiled function or its cache index, which numba does not annotate."""
+F = TypeVar("F", bound=Function)
 
 IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 """Relative import, the only kind of import within the package."""
@@ -82,17 +85,17 @@ class Kernel:
         # Division by zero follows NumPy, which compiles faster than an exception.
         self.py_func = function
         self._options = {"error_model": "numpy", **options}
-        self._ready: Callable[..., Any] | None = None
+        self._ready: Function | None = None
 
     # Unused wrappers are not compiled; they take up to half of the time for a small kernel.
 
     @cached_property
-    def compiled(self) -> Any:
+    def compiled(self) -> Dispatcher:
         """Compiled function with a wrapper for Python."""
         return self._compile("", no_cfunc_wrapper=True)
 
     @cached_property
-    def inner(self) -> Any:
+    def inner(self) -> Dispatcher:
         """Compiled function without wrappers, for calls by other kernels."""
         return self._compile(INNER, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
@@ -104,11 +107,11 @@ class Kernel:
         return list(self.compiled.overloads)
 
     @property
-    def _numba_type_(self) -> Any:
+    def _numba_type_(self) -> object:
         """Numba type, for kernels that call this kernel as an attribute of its module."""
         return self.compiled._numba_type_
 
-    def _compile(self, suffix: str, **options: bool) -> Any:
+    def _compile(self, suffix: str, **options: bool) -> Dispatcher:
         import numba
 
         function = self.py_func
@@ -148,12 +151,12 @@ class Kernel:
                 _preparation["seconds"] += perf_counter() - begin
         return self._ready(*args)
 
-    def _prepared(self, args: tuple[object, ...]) -> Callable[..., Any]:
+    def _prepared(self, args: tuple[object, ...]) -> Function:
         """Return the function, compiled or loaded for the types of some arguments."""
-        compiled: Any = self.compiled
+        compiled = self.compiled
         file = _cache_file(compiled)
         if file is None:
-            return cast(Callable[..., Any], compiled)
+            return cast(Function, compiled)
         from .kernel_cache import lock_beside
 
         types = tuple(map(compiled.typeof_pyval, args))
@@ -161,9 +164,9 @@ class Kernel:
             with lock_beside(file, LOCK):
                 self._compile_apart(compiled, types)
         compiled.compile(types)
-        return cast(Callable[..., Any], compiled)
+        return cast(Function, compiled)
 
-    def _compile_apart(self, compiled: Any, types: tuple[object, ...]) -> None:
+    def _compile_apart(self, compiled: Dispatcher, types: tuple[object, ...]) -> None:
         """Compile the function for argument types in the child process, if possible."""
         if not _is_cached(compiled, types):  # by the previous holder of the lock
             with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
@@ -228,12 +231,12 @@ def _names(code: CodeType) -> Iterator[str]:
             yield from _names(constant)
 
 
-def _cache_file(compiled: Any) -> Any:
+def _cache_file(compiled: Dispatcher) -> Dispatcher:
     """Return numba's cache index, or None for interpreted and uncached functions."""
     return None if isinstance(compiled, FunctionType) else vars(compiled._cache).get("_cache_file")
 
 
-def _is_cached(compiled: Any, types: tuple[object, ...]) -> bool:
+def _is_cached(compiled: Dispatcher, types: tuple[object, ...]) -> bool:
     """Return whether the cache has an undamaged function for arguments of these types."""
     key = compiled._cache._index_key(types, compiled.targetctx.codegen())
     return bool(compiled._cache._cache_file.is_sound(key))

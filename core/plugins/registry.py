@@ -269,7 +269,7 @@ class SettingsRegistry(Registry):
             model.build = PartSettings.build  # evaluators have their own
         return cast(type[PartSettings], model)
 
-    def _factory(self, name: str, thing: Callable[..., Any]) -> Callable[..., object]:
+    def _factory(self, name: str, thing: Callable[..., object]) -> Callable[..., object]:
         """Return a function that builds a thing of a user from its settings."""
 
         def build(settings: Settings, *given: object) -> object:
@@ -390,11 +390,11 @@ class Plugged(Kinds):
             return self.shorthand(value)
         if not isinstance(value, Mapping):
             words = "a name or a table" if self.shorthand is not None else "a table"
-            raise PydanticCustomError("table", cast(Any, f"must be {words}"))
+            raise PydanticCustomError("table", f"must be {words}")
         try:
             model = self.registry.model(str(value.get("kind", "")))
         except ValueError as error:
             raise PydanticCustomError(
-                "plugged_kind", cast(Any, "{message}"), {"message": str(error)}
+                "plugged_kind", "{message}", {"message": str(error)}
             ) from None
         return model.model_validate(tuples(value), strict=True, context=info.context)

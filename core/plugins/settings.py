@@ -223,7 +223,7 @@ class PartSettings(Settings):
     """Base class of the settings of registered things."""
 
     kind: str = ""
-    factory: ClassVar[str | Callable[..., Any]] = ""
+    factory: ClassVar[str | Callable[..., object]] = ""
     """Class or function that builds the thing from the settings, or its place, which is imported
     on first use."""
     player: ClassVar[str] = ""

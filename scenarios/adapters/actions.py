@@ -11,8 +11,9 @@ from gymnasium.spaces import Box, Discrete
 from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray
 from ..faults.wrappers import action_bounds
+from ..library_types import Space
 from .entries import MAX_BOUND
-from .simulators import SINGLE, Player, Space, describe
+from .simulators import SINGLE, Player, describe
 
 
 class ActionMap:

@@ -14,7 +14,8 @@ from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
 from gymnasium.spaces.utils import flatdim, flatten, flatten_space
 
 from ...core.numerics import FloatArray
-from .simulators import MASK_KEYS, Player, Space, describe, mask_error, when
+from ..library_types import Space
+from .simulators import MASK_KEYS, Player, describe, mask_error, when
 
 MAX_BOUND = 1e6
 """A space's bound beyond this is taken as infinite."""

@@ -18,8 +18,9 @@ from ...core.plugins import sources
 from ...core.plugins.origin import checked_origin
 from ...core.plugins.trust import is_module_name, modules_in
 from ...core.plugins.words import near
+from ..library_types import Environment
 from .settings import EnvironmentSettings, GymnasiumSettings
-from .simulators import Environment, GymnasiumSimulator, Simulator, make_simulator
+from .simulators import GymnasiumSimulator, Simulator, make_simulator
 
 Maker = Callable[[EnvironmentSettings, str | None], Simulator]
 """Makes a simulator from settings and a render mode."""

@@ -10,9 +10,10 @@ from gymnasium.spaces import Discrete
 
 from ...core.interface.spaces import Variable
 from ...core.numerics import BoolArray, FloatArray, IntArray, wrap
+from ..library_types import Space
 from .entries import ObservationEntries
 from .settings import Direction, Entries, EnvironmentSettings
-from .simulators import EnvironmentStep, Player, Space, describe, when
+from .simulators import EnvironmentStep, Player, describe, when
 
 MAX_CENTRES = 32
 """Maximum number of values of a discrete observation that each have a membership function."""

@@ -22,13 +22,14 @@ from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import StateSpace
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.sources import format_error, message
+from ..library_types import Environment
 from ..movies import film, save_picture
 from .actions import ActionMap
 from .copies import SimulatorCopies, copy_simulator, find_copy_fault
 from .loading import Maker, find_maker
 from .observations import StateReader
 from .settings import EnvironmentSettings, GymnasiumSettings, PettingZooSettings
-from .simulators import Environment, EnvironmentStep, Simulator, make_simulator
+from .simulators import EnvironmentStep, Simulator, make_simulator
 
 TRIAL_STEPS = 8
 """Steps played when a scenario is built, so that faults are reported before anything runs."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Hashable, Iterable, Mapping
 from copy import deepcopy
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import gymnasium
 import numpy as np
@@ -21,12 +21,10 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import aec_to_parallel
 
 from ...core.plugins.printing import printable
+from ..library_types import Data, Environment, Space
 
 Player = Hashable
 """Id of a PettingZoo agent, or `SINGLE` for the agent of a Gymnasium environment."""
-Space = gymnasium.Space[Any]
-Environment = Any
-"""A Gymnasium or PettingZoo environment, or an object with the same methods."""
 SINGLE: Player = None
 """The player of a Gymnasium environment, which has no name."""
 PARTS = ("observations", "rewards", "terminations", "truncations", "infos")
@@ -187,7 +185,7 @@ class PettingZooSimulator(Simulator):
         truncated = is_over and not terminated
         return EnvironmentStep(self._observations, rewards, terminated, truncated, self._steps)
 
-    def _by_player(self, part: object, name: str) -> Mapping[Player, Any]:
+    def _by_player(self, part: object, name: str) -> Mapping[Player, Data]:
         """Return a returned table after checking its type and its keys."""
         if not isinstance(part, Mapping):
             raise ValueError(f"{name} {when(self._steps)}: {type(part).__name__}, allowed: a dict")
@@ -224,7 +222,7 @@ class PettingZooSimulator(Simulator):
         return _finite_number(rewards.get(player, 0.0), name)
 
 
-def expand_all(flags: Mapping[Player, Any], agents: Collection[Player]) -> dict[Player, Any]:
+def expand_all(flags: Mapping[Player, Data], agents: Collection[Player]) -> dict[Player, Data]:
     """Return terminations or truncations without the key ``__all__`` of RLlib.
 
     If its value is true, it replaces the flags of all `agents`. If it is false, agents without a
@@ -282,7 +280,7 @@ def _unpack_reset(returned: object) -> tuple[object, object]:
     )
 
 
-def _unpack_step(returned: object) -> tuple[Any, ...]:
+def _unpack_step(returned: object) -> tuple[Data, ...]:
     if isinstance(returned, tuple | list) and len(returned) == 5:
         return tuple(returned)
     count = len(returned) if isinstance(returned, tuple | list) else 1

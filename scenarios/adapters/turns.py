@@ -9,9 +9,9 @@ returns. Between the turns of one step, the environment does not change and pays
 learner that treats each turn as a step learns little about the agents above.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete, Tuple
@@ -24,6 +24,7 @@ from ...core.hierarchy.failures import MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
+from ..library_types import Data, Options, Space
 from .simulators import Player, expand_all
 
 
@@ -67,7 +68,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
 
     def __init__(
         self,
-        env: ParallelEnv[str, Any, Any],
+        env: ParallelEnv[str, Data, Data],
         hierarchy: Hierarchy | None = None,
         failures: Sequence[MessageFailure] = (),
     ) -> None:
@@ -102,7 +103,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         """Return the space of an agent's observations."""
         return self._spaces[agent]
 
-    def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
+    def reset(self, seed: int | None = None, options: Options = None) -> None:
         """Start an episode; the agent at the top of the hierarchy acts first."""
         super().reset(seed=seed, options=options)
         if seed is not None:
@@ -114,13 +115,13 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
 
     def _begin_step(self) -> None:
         self._actions = dict.fromkeys(self.agents)
-        self._inboxes: dict[str, dict[str, Any]] = {}
+        self._inboxes: dict[str, dict[str, Data]] = {}
         waiting = [name for name in self._order if name in self.env.agents]
         if waiting:
             self._agent_selector = AgentSelector(waiting)
             self.agent_selection = self._agent_selector.reset()
 
-    def _deads_step_first(self) -> Any:
+    def _deads_step_first(self) -> Data:
         # PettingZoo calls this method after the environment has stepped.
         if self._messages.failures:
             self._messages.advance(self._joint())
@@ -146,7 +147,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         actions = [self._actions.get(name) for name in self.hierarchy.agents]
         return np.array([0 if action is None else action for action in actions], dtype=np.int64)
 
-    def _received(self, agent: str) -> dict[str, Any]:
+    def _received(self, agent: str) -> dict[str, Data]:
         """Return the actions communicated to an agent, by sender."""
         index = self._index[agent]
         names = self.hierarchy.agents
@@ -159,7 +160,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
             self._inboxes[agent] = {names[i]: a for i, a in inbox if names[i] in self._actions}
         return self._inboxes.get(agent, {})
 
-    def step(self, action: Any) -> None:
+    def step(self, action: Data) -> None:
         """Communicate the action of the selected agent; the last action steps the environment.
 
         As in PettingZoo, an agent that is done takes the action None and leaves.
@@ -178,7 +179,7 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         super().step(action)
 
 
-def _action_counts(name: str, space: Any) -> Any:
+def _action_counts(name: str, space: Space) -> IntArray:
     """Return the number of choices of each of an agent's actions ``(k,)``."""
     if isinstance(space, Discrete) and space.start == 0:
         return np.array([space.n])

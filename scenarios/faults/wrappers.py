@@ -28,7 +28,7 @@ From episode 3 on, the motor of a pendulum executes a third of its command.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import gymnasium
 import numpy as np
@@ -38,6 +38,7 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from ...core.numerics import BoolArray, FloatArray
 from ...core.plugins.settings import Names
+from ..library_types import Data, Environment, Options, Space
 from . import settings
 from .settings import Failures, FailureSettings, build_kinds
 
@@ -58,7 +59,7 @@ KINDS = build_kinds(ActuatorFault, **settings.KINDS)
 Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy = KINDS.values()
 
 
-def action_bounds(space: gymnasium.Space[Any], name: str) -> tuple[FloatArray, FloatArray]:
+def action_bounds(space: Space, name: str) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper bounds ``(k,)`` of the entries of an action.
 
     Raises
@@ -109,7 +110,7 @@ class ActionScale:
     """
 
     def __init__(
-        self, space: gymnasium.Space[Any], rest: ArrayLike | None = None, name: str = "action space"
+        self, space: Space, rest: ArrayLike | None = None, name: str = "action space"
     ) -> None:
         self.space = space
         self._low, self._high = (ends.astype(float) for ends in action_bounds(space, name))
@@ -128,7 +129,7 @@ class ActionScale:
 
     def action(
         self, place: FloatArray, chosen: object, changed: BoolArray, drawn: FloatArray
-    ) -> Any:
+    ) -> Data:
         """Return the action with given deviations from rest.
 
         Parameters
@@ -157,7 +158,7 @@ class ActionScale:
 
 Commands = Literal["effort", "velocity", "position"]
 """Physical meaning of actions."""
-Mechanism = Callable[[Any, dict[str, str]], None]
+Mechanism = Callable[[Environment, dict[str, str]], None]
 """Function that applies the faults that no action can express. It is called before each step with
 the wrapped environment and the kinds of these faults by actuator, and once when the last ends."""
 
@@ -177,12 +178,12 @@ class _Faulty(ABC):
         If a fault names no actuator, or cannot be expressed.
     """
 
-    env: Any
+    env: Environment
     """The wrapped environment."""
 
     def __init__(
         self,
-        env: Any,
+        env: Environment,
         faults: Sequence[ActuatorFault],
         *,
         seed: int = 0,
@@ -213,18 +214,18 @@ class _Faulty(ABC):
         self._seed = seed
         self._inform = inform
         self._hooked = False
-        self.carried: Any = None
+        self.carried: Data = None
         self._begin(0, 0)
 
     @abstractmethod
-    def _wrap(self, env: Any) -> None:
+    def _wrap(self, env: Environment) -> None:
         """Initialize the base class of the library."""
 
     @abstractmethod
-    def _scales(self, env: Any, rest: Any) -> dict[str, ActionScale]:
+    def _scales(self, env: Environment, rest: Data) -> dict[str, ActionScale]:
         """Return the scales of the action spaces by the prefix of their actuators."""
 
-    def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> Any:
+    def reset(self, seed: int | None = None, options: Options = None) -> Data:
         """Start an episode; a seed resets the episode count.
 
         The option ``fault_episode`` sets the number of the episode, which schedules faults.
@@ -245,7 +246,7 @@ class _Faulty(ABC):
         self._rng = np.random.default_rng(root)
         self._held = np.zeros(len(self.actuators))
 
-    def _carry(self, actions: Mapping[str, ArrayLike]) -> dict[str, Any]:
+    def _carry(self, actions: Mapping[str, ArrayLike]) -> dict[str, Data]:
         """Return the executed actions of one step by prefix; missing actions are at rest."""
         self._failures.strike(self._step)
         self._step += 1
@@ -321,13 +322,13 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         If a fault names no actuator or cannot be expressed, or the action space is not supported.
     """
 
-    def _wrap(self, env: Any) -> None:
+    def _wrap(self, env: Environment) -> None:
         gymnasium.Wrapper.__init__(self, env)
 
-    def _scales(self, env: Any, rest: Any) -> dict[str, ActionScale]:
+    def _scales(self, env: Environment, rest: Data) -> dict[str, ActionScale]:
         return {"": ActionScale(env.action_space, rest)}
 
-    def step(self, action: ArrayLike) -> tuple[Any, Any, bool, bool, dict[str, object]]:
+    def step(self, action: ArrayLike) -> tuple[Data, Data, bool, bool, dict[str, object]]:
         """Execute an action with faulty actuators."""
         self.carried = self._carry({"": action})[""]
         seen, reward, terminated, truncated, info = self.env.step(self.carried)
@@ -357,17 +358,17 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         The last executed actions, by agent.
     """
 
-    def _wrap(self, env: Any) -> None:
+    def _wrap(self, env: Environment) -> None:
         BaseParallelWrapper.__init__(self, env)
 
-    def _scales(self, env: Any, rest: Any) -> dict[str, ActionScale]:
+    def _scales(self, env: Environment, rest: Data) -> dict[str, ActionScale]:
         rests = rest or {}
         return {
             agent: ActionScale(env.action_space(agent), rests.get(agent), f"action space {agent}")
             for agent in env.possible_agents
         }
 
-    def step(self, actions: Mapping[str, ArrayLike]) -> tuple[dict[str, Any], ...]:
+    def step(self, actions: Mapping[str, ArrayLike]) -> tuple[dict[str, Data], ...]:
         """Execute the agents' actions with faulty actuators."""
         self.carried = self._carry(actions)
         *given, infos = self.env.step(self.carried)

@@ -12,7 +12,7 @@ fault. A seed that does not recover counts with all the episodes that were run: 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, NamedTuple, Protocol, TypeAlias, TypedDict, Unpack, runtime_checkable
+from typing import NamedTuple, Protocol, TypeAlias, TypedDict, Unpack, runtime_checkable
 
 import numpy as np
 
@@ -24,16 +24,12 @@ from ...scenarios.faults.wrappers import (
     FaultyParallelEnv,
     Mechanism,
 )
+from ...scenarios.library_types import Data, Environment
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
 from ..results.recovery import BLOCK, REGAINED, recovery
 from ..results.statistics import bootstrap, exactly, rate
-
-Data: TypeAlias = Any
-"""Observation, action or space of Gymnasium; by agent for a parallel environment."""
-Environment: TypeAlias = Any
-"""Environment of Gymnasium, or parallel environment of PettingZoo."""
 
 
 @runtime_checkable
