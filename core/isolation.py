@@ -2,7 +2,7 @@
 
 Nothing in the current folder is imported, or read as settings of a library.
 
-A study may lie in a folder that somebody else has filled, beside a ``joblib.py`` or a
+A study may lie in a folder that somebody else has filled, next to a ``joblib.py`` or a
 ``matplotlibrc``. Python puts the current folder on `sys.path` for ``-c`` and ``-m``, which is how
 most child processes start; matplotlib and numba read settings from it.
 """

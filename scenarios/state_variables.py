@@ -73,7 +73,7 @@ class StateVariable:
         if values.shape != (m,):
             raise ValueError(
                 f"state variable {name!r}: shape {values.shape}, must be {(m,)}: one value for "
-                "each situation of the view"
+                "each situation; fields are arrays, so use numpy.where instead of if"
             )
         if values.dtype.kind not in "fiu" or not np.isfinite(values).all():
             raise ValueError(f"state variable {name!r}: not all of its values are finite numbers")

@@ -2,7 +2,7 @@
 
 A string is ``"kind"`` or ``"kind:argument"``, see `parse`. To add a topology, write one function in
 `builders` and add one line to `TOPOLOGIES`; the function's keyword-only parameters are its
-settings. `strings.ARGUMENTS` defines what may follow ``kind:``.
+settings. A line in `strings.ARGUMENTS`, which is optional, defines what may follow ``kind:``.
 
 Users bring hierarchies as files of graphs or groups, as functions in Python files, and in installed
 packages. A user's topology is a function ``(agents, bodies) -> graph``. It receives the names of
@@ -31,17 +31,6 @@ from .strings import ARGUMENTS, Keys
 from .user_functions import call_builder
 
 BUILDERS = "nested_agents.topologies.builders"
-BUILT = (
-    "chain",
-    "tree",
-    "star",
-    "teams",
-    "independent",
-    "simultaneous",
-    "coordination-graph",
-)
-"""Topologies with builders of the same name."""
-
 
 DecisionOrder = Literal["listed", "reversed"] | tuple[str, ...]
 """Decision order: agent order, its reverse, or all names in order."""
@@ -95,9 +84,18 @@ IMPLIED = {"members": "teams", "edges": "edges"}
 
 TOPOLOGIES = SettingsRegistry(
     "topology",
-    {name: f"{BUILDERS}:{name.replace('-', '_')}" for name in BUILT}
-    | {"edges": f"{BUILDERS}:from_edges", "random": f"{BUILDERS}:random_hierarchy"}
-    | {"file": f"{__name__}:from_file"},
+    {
+        "chain": f"{BUILDERS}:chain",
+        "tree": f"{BUILDERS}:tree",
+        "star": f"{BUILDERS}:star",
+        "teams": f"{BUILDERS}:teams",
+        "independent": f"{BUILDERS}:independent",
+        "simultaneous": f"{BUILDERS}:simultaneous",
+        "coordination-graph": f"{BUILDERS}:coordination_graph",
+        "edges": f"{BUILDERS}:from_edges",
+        "random": f"{BUILDERS}:random_hierarchy",
+        "file": f"{__name__}:from_file",
+    },
     TopologySettings,
     moved={
         "single-agent": "who the agents are has a key of its own: agents = 'team'",

@@ -123,7 +123,7 @@ class ManyEnvironmentsLoop:
         ended = np.ones(len(starts), dtype=bool)
         states = self._states.copy()
         for step in range(len(self._joint_actions) + 1):
-            # An environment whose episode starts later is restarted whenever it ends meanwhile.
+            # Environments that start an episode later are restarted if they end before that.
             for index in np.flatnonzero((starts == step) | (ended & (starts > step))).tolist():
                 episode = int(self._episodes[index])
                 seed = world_seed(self._seed, episode)

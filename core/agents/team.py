@@ -190,13 +190,13 @@ class Team:
         states
             ``(n, d)`` present states of the agents.
         previous
-            ``(n,)`` previous joint action of the episode, if there is one.
+            ``(n,)`` previous joint action; None at the beginning of an episode, when the team's
+            leader enters the scenario.
 
         Raises
         ------
         ValueError
-            If the scenario predicts something that is no prediction, or has no leader where the
-            team has one; one line.
+            If the prediction is none, or the team has a leader and the scenario has not; one line.
         """
         if previous is None:  # an episode begins
             enter_scenario(self.leader, scenario)

@@ -77,9 +77,9 @@ scenario have the keys 0, 1, ...; sensor noise has the next key after this one."
 
 
 LOST = -1
-"""Action in place of a lost message."""
+"""Action that stands for a lost message."""
 GARBLED = -1
-"""Age of a message whose payload is unreadable."""
+"""Age of a message with an unreadable payload."""
 
 
 class Sent(NamedTuple):

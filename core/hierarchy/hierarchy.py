@@ -44,7 +44,7 @@ def _check_body_distances(distances: tuple[str, ...]) -> tuple[str, ...]:
 
 BodyDistances = Annotated[tuple[str, ...], AfterValidator(_check_body_distances)]
 Communication = Literal["ancestors", "parents", "none"] | BodyDistances
-"""Agents whose decided actions an agent receives; or the bodies of the ancestors among them."""
+"""Senders of the actions that an agent receives; or the bodies of the ancestors among them."""
 Lookahead = Literal["descendants", "children", "none"] | BodyDistances
 """Agents whose actions an agent searches over; or the bodies of the descendants among them."""
 

@@ -31,7 +31,7 @@ StateDict = dict[str, AnyArray]
 
 
 def select_prefix(prefix: str, state: Mapping[str, AnyArray]) -> StateDict:
-    """Return the arrays whose names begin with a prefix, named without it.
+    """Return the arrays with a prefix in their names, and remove the prefix.
 
     >>> select_prefix("part1.", {"part1.seen": np.zeros(2), "part2.seen": np.ones(1)})
     {'seen': array([0., 0.])}

@@ -40,7 +40,7 @@ class LeaderOptions(ABC):
 
     @abstractmethod
     def advance(self) -> bool:
-        """Return whether the option goes on; called before each of its decisions but the first."""
+        """Return whether the option continues; called before each decision except the first."""
 
     @abstractmethod
     def joint_action(self) -> IntArray | None:

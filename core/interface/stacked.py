@@ -17,7 +17,7 @@ S = TypeVar("S", bound=Scenario)
 
 
 class StackedEnvironments(Environments, Generic[S]):
-    """Environments whose states are stacked and stepped in one call.
+    """Environments with stacked states, which are stepped in one call.
 
     One scenario starts the episodes of all environments, one after the other, so that equal seeds
     give equal episodes however many environments there are.

@@ -42,7 +42,7 @@ class Learner(ABC):
     """
 
     fixed_arrays: ClassVar[tuple[str, ...]] = ("theta",)
-    """Names of saved arrays whose shapes the settings determine."""
+    """Names of saved arrays with shapes that the settings determine."""
     theta: FloatArray
     """``(n_rows, n_rules)`` consequent weights."""
 
@@ -131,7 +131,7 @@ class MembersOf(NamedTuple):
     settings: TeamSettings
     """Settings of these agents."""
     team: str | None = None
-    """File of a team whose weights they start from, or None."""
+    """File of the team that provides their initial weights, or None."""
 
 
 class TeamSettings(PartSettings):
@@ -235,7 +235,7 @@ class LearnerSettings(TeamSettings):
         space, actions
             Those of the scenario.
         n_told
-            Maximum number of agents whose actions an agent is told.
+            Maximum number of senders of an agent.
         """
         return space, RuleBase.build(space, self.rule_base)
 

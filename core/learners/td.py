@@ -190,7 +190,7 @@ class TDLambda(Online):
     excludes the reward of its own state, in which the after-states of a decision differ. Terminal
     states have the same value in both readings.
 
-    With averaging over n steps, w learns in place of theta, and the agent decides by::
+    With averaging over n steps, w learns instead of theta, and the agent decides by::
 
         theta = theta + (w - theta) / min(t, n)    after t updates
 
@@ -357,7 +357,7 @@ class QLearningSettings(OneStepSettings):
 
 
 class QLearning(OneStep):
-    """TD(0) whose target is the greatest value over the actions in the next state.
+    """TD(0) with the greatest value over the actions in the next state as its target.
 
     Let x be the situation of a state and u the actions in it. On entering (x', u') after (x, u)::
 

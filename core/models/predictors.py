@@ -120,7 +120,7 @@ class Mirror:
     signs
         ``(d,)`` -1 for state variables that change sign in a mirror, else 1.
     partners
-        ``(n,)`` partner of every agent, whose place it takes.
+        ``(n,)`` index of each agent's mirror image.
 
     Examples
     --------

@@ -62,7 +62,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     Examples
     --------
-    A cart whose only wheel is seized.
+    A cart with a single wheel, which is seized.
 
     >>> nominal = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
     >>> model = SelfModel(SelfModelSettings(enabled=True), [nominal])

@@ -185,7 +185,7 @@ class PPOAgents(Agents[PolicyInputs]):
         return self._groups[key]
 
     def _choose(self, inputs: PolicyInputs, inbox: Inbox) -> IntArray:
-        """Return the actions of a turn, whose logits are known."""
+        """Return the actions of a stage, which have the greatest sum of logit and noise."""
         logits = inputs.logits[:, inbox.agents]
         self._counts.joint_actions += logits.size
         chosen: IntArray = (logits + inputs.noise[:, inbox.agents]).argmax(axis=2)
@@ -340,6 +340,6 @@ class CentralPPOAgents(PPOAgents):
 
 
 def senders_of(hierarchy: Hierarchy) -> list[int]:
-    """Return the agents whose actions some agent is told, in agent order."""
+    """Return all agents that send their actions to another agent, in agent order."""
     superiors = (hierarchy.senders(agent) for agent in range(len(hierarchy)))
     return sorted({sender for senders in superiors for sender in senders})

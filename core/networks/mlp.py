@@ -67,7 +67,7 @@ class MLP:
             biases[:] = 0.0
 
     def warm_start(self, other: MLP, rows: Sequence[int | None]) -> None:
-        """Copy the weights of a network of equal layers whose inputs may differ.
+        """Copy the weights of a network of equal layers; the inputs may differ.
 
         Parameters
         ----------

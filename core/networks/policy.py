@@ -5,9 +5,9 @@ The clipped loss (Schulman et al. 2017) of a minibatch of m transitions is::
     -mean(min(r a, clip(r, 1 - c, 1 + c) a)) - e mean(H) + mean((v - g)^2) / 2
 
 with probability ratios r, advantages a (normalized to mean 0 and standard deviation 1),
-entropies H, values v, and returns g. An action has one or several *heads*: independent choices,
-whose log probabilities and entropies add up. Axes are T steps of a rollout, E environments,
-k agents, h heads and A choices of a head.
+entropies H, values v, and returns g. An action has one or several *heads*, which are independent
+choices: their log probabilities and entropies add up. Axes are T steps of a rollout, E
+environments, k agents, h heads and A choices of a head.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class Policy:
         Parameters
         ----------
         truncated
-            ``(E,)`` environments whose episodes end without a terminal state, t of them.
+            ``(E,)`` environments that end an episode without a terminal state, t of them.
         own, joint
             Inputs ``(t, k, n_own)`` and ``(t, n_joint)`` in their next states.
         """
@@ -293,7 +293,7 @@ class Policy:
             array[: self.rollout.steps] = rollout[name]
 
     def warm_start(self, former: Policy, names: InputNames, former_names: InputNames) -> None:
-        """Start with the weights of another policy, whose inputs may differ.
+        """Start with the weights of another policy, which may have other inputs.
 
         Weights belong to the names of inputs. Inputs that the other policy does not have get zero
         weights. Moments of Adam and the rollout start empty.

@@ -41,7 +41,7 @@ def greatest(values: FloatArray, rng: np.random.Generator) -> int:
 
 _TURN = 2.0 * pi
 _TURN_HIGH = 6.283185243606567
-"""The leading 26 bits of a turn, whose products with a few thousand turns are exact."""
+"""The leading 26 bits of 2 pi: products with up to a few thousand turns are exact."""
 _TURN_LOW = _TURN - _TURN_HIGH
 
 

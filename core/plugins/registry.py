@@ -322,7 +322,7 @@ def _parameters(thing: Callable[..., Any]) -> dict[str, Any]:
 
 
 _described: ContextVar[tuple[Registry, ...]] = ContextVar("registries", default=())
-"""Registries whose JSON schema is being written."""
+"""Registries with a JSON schema that is being written."""
 
 
 def _dump(value: Settings, info: SerializationInfo) -> dict[str, object]:

@@ -100,11 +100,11 @@ class _BodyValues(NamedTuple):
     """Values of the joint actions of one body's agents, as last computed."""
 
     concerned: IntArray
-    """Agents whose values are averaged."""
+    """Agents that share the averaged value."""
     plan: IntArray
     """``(n,)`` actions of the other agents."""
     free: tuple[int, ...]
-    """The k agents whose actions vary."""
+    """The k agents that vary their actions."""
     values: FloatArray
     """``(A,) * k`` values by the action of each free agent."""
 
@@ -376,7 +376,7 @@ def _check_common_plan(problem: DecisionProblem) -> None:
 
 
 def _planners(problem: DecisionProblem) -> list[int]:
-    """Return the agent whose plan each agent decides by: itself, or one that shares its plan."""
+    """Return the planner of each agent: itself, or another agent that shares its plan."""
     hierarchy, planners = problem.hierarchy, {}
     views = {i: () if problem.unseen == "plan" else hierarchy.unseen(i) for i in hierarchy.order}
     for i, view in views.items():

@@ -302,7 +302,7 @@ def other_edges(graph: nx.Graph, seed: int) -> nx.Graph:
 
 
 def orient(graph: nx.Graph, order: Sequence[str], *, fill_in: bool) -> nx.DiGraph:
-    """Return a graph whose edges lead from earlier agents in `order` to later ones.
+    """Return a graph with edges from earlier agents in `order` to later agents.
 
     With `fill_in`, the superiors of each agent are joined to each other, from the last agent to the
     first. Eliminating an agent makes its best action depend on all of them (Dechter 1999).

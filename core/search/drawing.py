@@ -51,7 +51,7 @@ def choose_action(
 def choose_among_equal(
     order: IntArray, n_actions: int, exploring: Exploring, rng: np.random.Generator
 ) -> IntArray:
-    """Return the actions ``(n,)`` of agents for whom all actions have the same value."""
+    """Return random actions ``(n,)``, held or not, because all actions have the same value."""
     joint = np.empty_like(order)
     values = np.zeros(n_actions)
     for agent in order:

@@ -63,7 +63,7 @@ class DecisionContext(NamedTuple):
     """``(A, n, A)`` the same frequencies given each action of the deciding agent. Empty unless the
     teammate model is ``conditional``."""
     told: IntArray = NO_AGENTS
-    """``(k,)`` agents whose actions it was told."""
+    """``(k,)`` agents that sent it their actions."""
     present: FloatArray = NO_STATES
     """``(n, d)`` present states of all agents. Learners of action values append the actions that
     each agent was told."""
@@ -250,7 +250,7 @@ class Aggregation(Evaluator):
 
     @staticmethod
     def require(key: str, value: str, allowed: str, why: str) -> None:
-        """Refuse decision settings whose `key` has another `value` than is allowed here."""
+        """Refuse a decision setting: the evaluator allows only one value of this key."""
         if value != allowed:
             raise ValueError(f"learner.decision.{key} = {value!r}: {why}")
 

@@ -193,7 +193,7 @@ class RuleBase:
 
     @cached_property
     def terms_by_owner(self) -> tuple[IntArray, IntArray, IntArray]:
-        """Rows of the layout whose terms an agent owns, its body's agents share, or all share."""
+        """Rows of the layout by owner: terms of one agent, of the agents of a body, of all."""
         own = np.array([any(j < self.n_own for j in term) for term in self.terms])
         common = ~own & [self.common.issuperset(term) for term in self.terms]
         rows = self.layout[1]

@@ -49,7 +49,7 @@ class BoxOptions(LeaderOptions):
     Attributes
     ----------
     count
-        Number of options begun in the episode.
+        Number of options so far in the episode.
 
     Raises
     ------
@@ -105,7 +105,7 @@ class BoxOptions(LeaderOptions):
         return self._scenario.states_at_rest()
 
     def advance(self) -> bool:
-        """Return whether the option goes on; begin to walk if the box is at the waypoint."""
+        """Return whether the option continues; begin to walk if the box is at the waypoint."""
         self._decisions += 1
         if self._next_side is None:
             return True

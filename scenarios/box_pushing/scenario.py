@@ -230,7 +230,7 @@ class BoxPushing(Scenario):
         return BoxEnvironments(self, count)
 
     def predict(self) -> BoxPrediction:
-        """Predict from the current state; all robots are assumed to be nominal."""
+        """Predict from the current state; only the exact predictor knows of failures."""
         situation = PresentState(
             self.world.robot_poses.copy(),
             self.world.box_pose.copy(),

@@ -236,7 +236,7 @@ def _tabular(section: Section, frame: pd.DataFrame, rows: Sequence[CostRow]) -> 
 
 
 def _latex_cell(text: str) -> str:
-    """Return a number for LaTeX as it is printed."""
+    """Return a number of the printed table for LaTeX."""
     if text == "-":
         return "--"
     mantissa, e, power = text.partition("e")

@@ -120,7 +120,7 @@ class Law(NamedTuple):
         return self._distribution(size, self.noise / (seeds or self.seeds))
 
     def _distribution(self, size: float, noise: float) -> Mixture:
-        """Return the distribution of the law and of a mean whose weight of 1 has this variance."""
+        """Return the distribution of the law and of a mean; `noise` is its variance at weight 1."""
         x = np.log([size])
         value = self.curve.of(self.parameters, x)
         parts = [

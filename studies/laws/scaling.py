@@ -23,7 +23,7 @@ from .samples import GEOMETRIC, of_numbers, of_rates, of_times
 from .size_axis import SizeAxis, check_size, columns_of
 
 WINDOW = 5
-"""Episodes in a row whose mean success must reach a criterion."""
+"""Number of consecutive episodes over which mean success must reach a criterion."""
 
 
 class Fitted(NamedTuple):

@@ -377,7 +377,7 @@ def _in_markdown(text: str) -> str:
 
 
 def _in_one_line(text: str) -> str:
-    """Return text with control characters escaped, and spaces in place of line breaks."""
+    """Return text with control characters escaped and line breaks replaced by spaces."""
     return " ".join(printable(text).split())
 
 

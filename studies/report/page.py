@@ -128,7 +128,7 @@ def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> dict[st
 def _scalability_report(
     results: Results, settings: Mapping[str, SpecTable]
 ) -> ScalabilityReport | None:
-    """Return the scalability of a study with two or more team sizes; None of another study."""
+    """Return the scalability report, or None if the study does not compare team sizes."""
     keys = {key for columns in columns_of(results).values() for key in columns}
     size = next((key for key in sorted(keys) if key.rpartition(".")[2] in SIZES), None)
     if size is None:

@@ -79,7 +79,7 @@ def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Pict
 def crops_of(figure: Figure) -> tuple[Crop, ...]:
     """Return the legends and the panels of a figure.
 
-    A panel that shares the vertical axis of the first panel in its row is shown beside that axis.
+    A panel that shares the vertical axis of the first panel in its row is shown next to that axis.
     """
     panels = [axes for axes in figure.axes if axes.get_visible()]
     if len(panels) < 2:

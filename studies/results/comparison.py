@@ -225,7 +225,7 @@ def missing_reference(results: Results) -> list[str]:
 def power_with_first(results: Results) -> tuple[str, ...]:
     """Return lines on which differences from the first condition the seeds detect.
 
-    They agree with those of `compare_conditions`, whose tests take seconds for thousands of seeds.
+    They agree with those of `compare_conditions`, which takes seconds for thousands of seeds.
     """
     measure, values, phase = values_of(results, results.main.name)
     base, *others = (values[c] for c in results.columns if c in values)

@@ -162,7 +162,7 @@ def combine(
 ) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
 
-    Conditions whose label occurs more than once are distinguished by their `settings`, where one or
+    Conditions with the same label are distinguished by their `settings`, where one or
     two of these differ, else by the name of their study. Their columns tell it, too, as
     `DIRECTORY`.
 

@@ -35,7 +35,7 @@ MAX_SCORE = 1e100
 
 
 class JsonNumber(str):
-    """A number of a JSON file, as it is written."""
+    """A number of a JSON file with all its written digits."""
 
     __slots__ = ()
 

@@ -137,7 +137,7 @@ def collect(
     Parameters
     ----------
     results
-        Results of a study whose sizes are a swept key of numbers.
+        Results of a study that sweeps the team size, a key with numbers.
     scaling
         Whether the task stays the same or grows with the team.
     measure

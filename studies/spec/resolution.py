@@ -268,7 +268,7 @@ def expand(table: SpecTable, where: str) -> TomlTable:
 def known_tables(table: SpecTable) -> tuple[type[Settings], TomlTable]:
     """Return the model of conditions, and the tables that all conditions of a spec share.
 
-    In them a misplaced key is searched. They are empty for an override, whose kinds are unknown.
+    A misplaced key is searched in them. They are empty for an override, which has no known kinds.
     """
     preset = PRESETS.get(str(table.get("preset", "default")), PRESETS["default"])
     own = {name: table[name] for name in SECTIONS if isinstance(table.get(name), Mapping)}

@@ -47,7 +47,7 @@ def trial_checksums(db: sqlite3.Connection, identity: str | None = None) -> dict
 
 
 def find_altered(db: sqlite3.Connection) -> list[str]:
-    """Return the identities of trials whose rows do not match their checksums."""
+    """Return the identities of trials with rows that do not match their checksums."""
     written: dict[str, str] = dict(db.execute("SELECT identity, sha256 FROM checksums").fetchall())
     present = trial_checksums(db)
     # An identity without rows has the checksum "", because a damaged checksum may be NULL.

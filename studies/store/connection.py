@@ -38,7 +38,7 @@ DECODE_ERRORS = (UnicodeError, OverflowError)
 """Errors of Python when SQLite returns damaged text or sizes."""
 
 SIDE_FILES = ("-journal", "-wal")
-"""Suffixes of the files that SQLite keeps beside a database; older versions kept a log (-wal)."""
+"""Suffixes of the files that SQLite keeps next to a database; older versions kept a log (-wal)."""
 
 READ_TIMEOUT_S = 1.0
 """Maximum time that a reader waits for a transaction to end before it copies the files [s]."""

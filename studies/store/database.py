@@ -14,9 +14,9 @@ from .checksums import study_checksum
 DATABASE = "results.sqlite"
 """Name of the file, in the directory of a study."""
 SPEC_FILE = "study.toml"
-"""Name of a study's own copy of its spec, beside it."""
+"""Name of a study's own copy of its spec, in the folder of the database."""
 CHECKPOINTS = "checkpoints"
-"""Folder of the checkpoints of running trials, beside it."""
+"""Folder of the checkpoints of running trials, in the folder of the database."""
 
 
 class NoStudyError(SpecError):
@@ -52,7 +52,7 @@ SECONDS = ("decision", "physics", "sensors", "learning", "total")
 """Timed parts of a trial."""
 
 TABLES_OF_TRIALS = ("trials", "episodes", "seconds", "numbers", "checksums")
-"""Tables whose rows belong to a trial, by its identity."""
+"""Tables with rows of single trials, by identity of the trial."""
 
 SCHEMA = (
     "CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL)",

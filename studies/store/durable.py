@@ -24,7 +24,7 @@ Recording = dict[str, "NDArray[Any]"]
 its ``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)`` if messages can fail."""
 
 TEAM = "team"
-"""Name of a trained team's arrays, beside the names of recorded episodes."""
+"""Name of a trained team's arrays among the names of recorded episodes."""
 
 
 Place = str | os.PathLike[str]
@@ -40,7 +40,7 @@ MAX_FILE_BYTES = 2**30
 
 
 def check_file(path: Place) -> None:
-    """Refuse a pipe, a socket, a device and a huge file, whose reader would wait or never end.
+    """Refuse a pipe, a socket, a device and a huge file, because reading would wait or never end.
 
     Raises
     ------

@@ -136,7 +136,7 @@ class Store:
             raise SpecError(f"{where}; {command_line('run')} runs it again")
 
     def _damaged_rows(self) -> dict[str, str]:
-        """Return one line for each trial whose rows do not match their checksum, by identity."""
+        """Return one line for each trial with rows that differ from their checksum, by identity."""
         damaged = [] if self.is_older else find_altered(self._db)
         if not damaged:
             return {}
@@ -244,7 +244,7 @@ class Store:
         study
             Description of the study.
         files
-            Contents of files beside the database, by name.
+            Contents of files in the folder of the database, by name.
 
         Raises
         ------

@@ -14,7 +14,7 @@ from . import durable
 from .connection import NO_LOCKS, NoLocksError
 
 LOCK = ".lock"
-"""Name of the file whose lock the writing process holds."""
+"""Name of the file that the writing process locks."""
 MARK = "running.json"
 """Name of the file that lists the running trials."""
 LOCK_WAITS_S = (0.05, 0.1, 0.0)
@@ -62,7 +62,7 @@ class Running(AbstractContextManager["Running"]):
     Parameters
     ----------
     directory
-        Directory of the study, whose lock this process holds.
+        Directory of the study, locked by this process.
     processes
         Number of trials that run at a time.
     """
@@ -96,7 +96,7 @@ class Running(AbstractContextManager["Running"]):
 
 
 def read_running(directory: Path) -> tuple[int, dict[str, float]] | None:
-    """Return the running trials of a study; None if nobody runs it.
+    """Return the running trials of a study; None if no process runs it.
 
     Returns
     -------

@@ -156,7 +156,7 @@ class Session:
 
     @classmethod
     def restored(cls, trial: Trial, arrays: Recording) -> Session:
-        """Return a session with the trained team whose arrays a trial stored.
+        """Return a session with the trained team that a trial stored.
 
         Raises
         ------

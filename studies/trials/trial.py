@@ -195,7 +195,7 @@ def unpickle(
     curriculum: Sequence[tuple[str, int, SpecTable]],
     plain: SpecTable,
 ) -> Trial:
-    """Return a pickled trial, whose settings are validated by the classes in its files."""
+    """Return a pickled trial; the classes in its files validate its settings."""
     build = partial(ConditionSettings.model_validate, strict=True)
     with sources.active():
         stages = [Stage(n, k, build({"scenario": table}).scenario) for n, k, table in curriculum]

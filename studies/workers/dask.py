@@ -139,12 +139,12 @@ class DaskWorkers(Workers[Future]):
         return workers if self._max_trials is None else min(workers, self._max_trials)
 
     def submit(self, run_trial: RunTrial, trial: Trial) -> Future:
-        """See `Workers.submit`."""
+        """Run a trial on the cluster, see `Workers.submit`."""
         call = call_for(run_trial, trial)
         return self._client.submit(call_if_compatible, versions(), *call, pure=False)
 
     def fetch(self, future: Future, trial: Trial) -> Outcome | None:
-        """See `Workers.fetch`."""
+        """Return the outcome of a trial, see `Workers.fetch`."""
         try:
             result: Outcome | Answer = future.result(timeout=CONNECT_TIMEOUT_S)
         except TimeoutError:
@@ -161,7 +161,7 @@ class DaskWorkers(Workers[Future]):
         return result if isinstance(result, Outcome) else result.outcome(trial)
 
     def stop(self, futures: Sequence[Future]) -> None:
-        """See `Workers.stop`."""
+        """Stop trials that are running, see `Workers.stop`."""
         with suppress(OSError, ValueError, CancelledError):
             self._client.cancel(list(futures), force=True)
 

@@ -1,6 +1,6 @@
 """Running trials on workers and storing each result when it arrives.
 
-A trial whose worker died runs again after the others, alone, up to `ATTEMPTS` times. Worker
+If a worker dies, its trial runs again after the others, alone, up to `ATTEMPTS` times. Worker
 processes import this module, so it imports little.
 """
 
@@ -32,7 +32,7 @@ PARENT_POLL_S = 0.5
 """Polling interval of a worker for the end of its parent [s]."""
 
 PACKAGES = ("nested-agents", "numpy", "numba", "scipy", "Box2D")
-"""Packages whose versions may affect the bits of a result."""
+"""Packages with versions that may affect the bits of a result."""
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment variables for one thread of linear algebra, because bits depend on the number."""
@@ -286,7 +286,7 @@ class Workers(ABC, Generic[F]):
 
     @abstractmethod
     def fetch(self, future: F, trial: Trial) -> Outcome | None:
-        """Return the outcome of a trial whose future is done; None if it runs again."""
+        """Return the outcome of a trial after its future is done; None if it runs again."""
 
     @abstractmethod
     def stop(self, futures: Sequence[F]) -> None:

@@ -158,7 +158,7 @@ class LokyWorkers(Workers[Future[Outcome | Answer]]):
             os.environ["PYTHONWARNINGS"] = f"{filters},{TRACKER_FILTER}".lstrip(",")
 
     def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Outcome | Answer]:
-        """See `Workers.submit`."""
+        """Run a trial in a worker process, see `Workers.submit`."""
         self._executor = get_reusable_executor(  # a new one if a worker has died
             self.processes,
             timeout=IDLE_TIMEOUT_S,
@@ -170,7 +170,7 @@ class LokyWorkers(Workers[Future[Outcome | Answer]]):
         return future
 
     def fetch(self, future: Future[Outcome | Answer], trial: Trial) -> Outcome:
-        """See `Workers.fetch`."""
+        """Return the outcome of a trial, see `Workers.fetch`."""
         try:
             result = future.result()
         except TerminatedWorkerError as death:
@@ -178,7 +178,7 @@ class LokyWorkers(Workers[Future[Outcome | Answer]]):
         return result if isinstance(result, Outcome) else result.outcome(trial)
 
     def stop(self, futures: Sequence[Future[Outcome | Answer]]) -> None:
-        """See `Workers.stop`."""
+        """Stop trials that are running, see `Workers.stop`."""
         until = time.monotonic() + HAND_OVER_TIMEOUT_S
         while any(not (f.running() or f.done()) for f in futures) and time.monotonic() < until:
             time.sleep(0.01)  # otherwise a thread of loky ends with a traceback

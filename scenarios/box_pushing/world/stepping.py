@@ -33,7 +33,7 @@ FORCE = 76
 TORQUE = 84
 """Offsets of the members of a ``b2Body`` of Box2D 2.3 [bytes]; vectors are two numbers."""
 AWAKE = 2
-"""Flag of bodies that have not come to rest; it must be set when a force is applied."""
+"""Flag of bodies in motion, which Box2D simulates; set it when a force is applied."""
 STEP = "_ZN7b2World4StepEfii"
 """Symbol of ``b2World::Step(float, int, int)``."""
 VELOCITY_ITERATIONS = 8

@@ -127,10 +127,7 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
         seen = EVERY.shared(situation(robots, box, [0.1, 0.2]), [robot])[0][0]
         batch = situation(robots * flip, box * flip, [0.1, 0.2])
         mirrored = EVERY.shared(batch, [robot])[0][0]
-        signs = [
-            -1 if described.low < 0 and described.name != "approach" else 1
-            for described in EVERY.space.shared
-        ]
+        signs = [1 if each.mirrored == "same" else -1 for each in EVERY.space.shared]
         np.testing.assert_allclose(mirrored, seen * signs, atol=1e-12)
 
 

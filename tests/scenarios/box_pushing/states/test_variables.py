@@ -15,8 +15,6 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import build_space
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES, progress_of
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
-NAMES = tuple(STATE_VARIABLES.built_in)
-
 
 def drawn(box: str, robots: int, number: int = 100, scale: float = 1.0) -> SituationBatch:
     rng = np.random.default_rng(robots)
@@ -29,6 +27,13 @@ def drawn(box: str, robots: int, number: int = 100, scale: float = 1.0) -> Situa
         3.0,
         BOXES[box].shape,
     )
+
+
+NAMES = tuple(variables(drawn("square", 1, 1), 0))
+
+
+def test_every_variable_has_a_formula_in_the_reference() -> None:
+    assert {*STATE_VARIABLES.built_in} == {*NAMES}, "add it to variables_oracle.py"
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
