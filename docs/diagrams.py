@@ -271,23 +271,30 @@ def predictions() -> Figure:
 
 
 def learning_curves() -> Figure:
-    """Draw success by episode of a team and three controls."""
+    """Draw success by episode of two teams and three controls, and the orientation of the box."""
     results = load("learning-curve").results
-    figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
-    axes = figure.subplots()
+    figure = Figure(figsize=(WIDTH + 0.6, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1))
     names = {
         "own-value": "learning team", "planner": "planner (knows the reward)",
         "frozen": "untrained team", "paper": "constants of the paper",
+        "pose": "learning team, within 15 degrees",
     }  # fmt: skip
     for line, (condition, label) in enumerate(names.items()):
         success = results.success(condition, "training")
         episodes = np.arange(0, success.shape[1], 2)
         pairs = [na.rate(success[:, e : e + 2]) for e in episodes]
-        draw_points(axes, episodes + 1.5 + 0.1 * line, pairs, line, label)
-    axes.set(xlabel="episode of training", ylabel="success", ylim=(-0.05, 1.05))
-    axes.set_xticks((1, 5, 10, 15, 20))
-    axes.legend(loc="center right", frameon=False)
-    return titled(figure, "Two robots learn to push a box within ten episodes")
+        draw_points(left, episodes + 1.5 + 0.1 * line, pairs, line, label)
+    errors = results.values("pose", "final_orientation_deg")
+    means = [na.bootstrap(errors[:, e : e + 2].mean(axis=1)) for e in episodes]
+    draw_points(right, episodes + 1.5, means, line, "")
+    right.axhline(15.0, color=GRAY, linestyle=":")
+    left.set(ylabel="success", ylim=(-0.05, 1.05))
+    right.set(ylabel="final orientation error [deg]", ylim=(0.0, None))
+    for axes in (left, right):
+        axes.set(xlabel="episode of training", xticks=(1, 5, 10, 15, 20))
+    figure.legend(loc="outside lower center", ncols=2, frameon=False)
+    return titled(figure, "Two robots learn to push a box, also to an orientation")
 
 
 def hierarchies() -> Figure:

@@ -81,7 +81,8 @@ class BoxTaskSettings(ScenarioSettings):
     termination_radius: Positive = 1.5
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
     orientation_tolerance: Positive | None = None
-    """Orientation error that still counts as reached [rad]; none: any."""
+    """Orientation error that still counts as reached [rad]; none: any. With a tolerance, results
+    contain the orientation error at the end of each episode."""
 
     @property
     def task_size(self) -> float:

@@ -16,7 +16,7 @@ from ...core.interface.options import LeaderOptions
 from ...core.interface.spaces import ActionSet, StateSpace, Variable
 from ...core.numerics import FloatArray, IntArray, wrap_one
 from .config import BoxPushingSettings
-from .measurements import MEASURES, OPTIONS
+from .measurements import OPTIONS
 from .scenario import BoxPushing
 from .walking import Walk, poses_in_box, sides_of
 
@@ -151,10 +151,10 @@ class LedBoxPushing(BoxPushing):
     """Box pushing with a leader above all wheels."""
 
     has_leader = True
-    measures = (*MEASURES, OPTIONS)
 
     def __init__(self, settings: BoxPushingSettings) -> None:
         super().__init__(settings)
+        self.measures = (*self.measures, OPTIONS)
         self.options = BoxOptions(self)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:

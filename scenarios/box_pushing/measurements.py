@@ -15,14 +15,6 @@ MEASURES = (
     ),
     Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
     Measure(
-        "final_orientation_rad",
-        "final orientation error",
-        "rad",
-        "orientation_error_rad",
-        better="lower",
-        least=0.0,
-    ),
-    Measure(
         "contact_fraction",
         "time in contact",
         source="contact_fraction",
@@ -34,3 +26,14 @@ MEASURES = (
 )
 """Measures of an episode. It is a success if the box comes within the tolerance of the goal at any
 speed, and stopped at the goal if it is there after the robots have stopped."""
+ORIENTATION = Measure(
+    "final_orientation_deg",
+    "final orientation error",
+    "deg",
+    "orientation_error_deg",
+    better="lower",
+    least=0.0,
+    greatest=180.0,
+)
+"""Angle between the box and its goal pose at the end of an episode, a measure of tasks with an
+orientation tolerance only. A team that need not turn the box is not judged by it."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -23,7 +24,7 @@ from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, wrap
 from ...core.plugins.words import expect
 from .config import BoxPushingSettings
-from .measurements import MEASURES
+from .measurements import MEASURES, ORIENTATION
 from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap
 from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
@@ -72,7 +73,7 @@ class BoxPushing(Scenario):
     (4, 8)
     """
 
-    measures: tuple[Measure, ...] = MEASURES
+    measures: tuple[Measure, ...]
     has_leader: ClassVar[bool] = False
     """Whether there is a leader above the agents, see `leading`."""
     regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
@@ -86,6 +87,8 @@ class BoxPushing(Scenario):
                 "build the scenario by settings.build(), or leave out leader"
             )
         self.settings = settings
+        is_oriented = settings.orientation_tolerance is not None
+        self.measures = (*MEASURES, ORIENTATION) if is_oriented else MEASURES
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
         similar = settings.scaling == "similar"
@@ -311,7 +314,7 @@ class BoxPushing(Scenario):
             "failed": self._failures.failed,
             "distance_m": distance,
             "orientation_rad": orientation,
-            "orientation_error_rad": abs(orientation),
+            "orientation_error_deg": degrees(abs(orientation)),
             "stopped_at_goal": False,
         }
 

@@ -204,6 +204,8 @@ def _one_line_errors(path: Path) -> Iterator[None]:
         yield
     except sqlite3.DatabaseError as error:
         raise _explain(path, error) from None
+    except UnicodeDecodeError as error:  # of SQLite's message, which quotes the damaged text
+        raise DamageError(path, str(error)) from None
 
 
 def _explain(path: Path, error: sqlite3.DatabaseError) -> SpecError:

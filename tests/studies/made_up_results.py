@@ -48,7 +48,6 @@ def arrays(chances: np.ndarray, rng: np.random.Generator, seeds: int = SEEDS) ->
         "stopped_at_goal": (success & (rng.random(shape) < 0.9)).astype(int),
         "steps": np.where(success, rng.integers(30, 90, shape), 450),
         "final_distance_m": np.where(success, 0.05, rng.uniform(0.2, 1.2, shape)),
-        "final_orientation_rad": rng.uniform(0, 0.5, shape),
         "contact_fraction": rng.uniform(0.4, 0.8, shape),
         "return": rng.normal(size=shape),
     }

@@ -127,15 +127,13 @@ def test_it_is_registered_and_its_settings_need_no_physics() -> None:
 
 def test_what_an_episode_is_told_by() -> None:
     scenario = with_box_at(0.97, BoxPushingSettings())
-    assert [measure.name for measure in measures_of(scenario.measures)] == [
-        "success", "stopped_at_goal", "final_distance_m", "final_orientation_rad",
-        "contact_fraction",
-    ]  # fmt: skip
+    names = ["success", "stopped_at_goal", "final_distance_m", "contact_fraction"]
+    assert [measure.name for measure in measures_of(scenario.measures)] == names
     assert not scenario.measure()["stopped_at_goal"]
     scenario = with_box_at(0.7, BoxPushingSettings())
     info = scenario.step(np.full(4, 3)).info
     assert info["stopped_at_goal"] is False
-    assert info["orientation_error_rad"] == abs(info["orientation_rad"])
+    assert info["orientation_error_deg"] == np.degrees(abs(info["orientation_rad"]))
     assert info["contact_fraction"] == np.mean(info["contact_time"])
 
 
@@ -191,3 +189,13 @@ def test_up_to_two_robots_there_is_one_scaling(robots: int) -> None:
         for scaling in ("fixed", "similar")
     ]
     np.testing.assert_array_equal(*states)
+
+
+@pytest.mark.parametrize("leader", ["none", "rule"])
+def test_orientation_is_a_measure_only_where_the_task_asks_for_it(leader: str) -> None:
+    settings = {"robots": 2, "leader": {"policy": leader}}
+    for tolerance, expected in ((None, False), (0.26, True)):
+        scenario = BoxPushingSettings(**settings, orientation_tolerance=tolerance).build()
+        names = [measure.name for measure in scenario.measures]
+        assert ("final_orientation_deg" in names) is expected
+        assert ("options" in names) is (leader == "rule")

@@ -6,7 +6,7 @@ import pytest
 from made_up_results import Arrays
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.scenarios.box_pushing.scenario import MEASURES
+from nested_agents.scenarios.box_pushing.measurements import MEASURES, ORIENTATION
 from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, draw, metrics_of
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import write_rows
@@ -40,8 +40,23 @@ def test_the_table_takes_the_ends_of_training_and_the_evaluation():
     assert float(never.estimates["success last 5"].value) == 0.0
     assert list(learns.estimates) == [
         "success first 5", "success last 5", "evaluation success", "evaluation steps",
-        "final distance [m]", "final orientation error [rad]", "time in contact",
+        "final distance [m]", "time in contact",
     ]  # fmt: skip
+
+
+def test_a_measure_of_one_condition_has_a_panel_with_its_curve_alone():
+    results = made_up()
+    results.measures = (*MEASURES, ORIENTATION)
+    results.training["learns"][ORIENTATION.name] = np.full((4, 12), 20.0)
+    analysis = analyse(results.frames())
+    followed = {measure.heading: list(training) for measure, training in analysis.cases}
+    assert followed["final orientation error [deg]"] == ["learns"]
+    assert followed["success"] == ["learns", "never"]
+    learns, never = (line.estimates for line in analysis.table)
+    assert float(learns["final orientation error [deg]"].value) == 20.0
+    assert "final orientation error [deg]" not in never
+    panels = {axes.get_title(loc="left"): axes for axes in draw(analysis)["learning-curves"].axes}
+    assert len(panels["final orientation error [deg]"].lines) < len(panels["success"].lines)
 
 
 def test_curves_have_a_point_for_every_episode():

@@ -101,7 +101,7 @@ def test_results_in_every_form(study, capsys):
     assert len(rows) == 2 * 3 * 4
     assert list(rows[0]) == [
         "condition", "preset", "seed", "phase", "episode", "steps", "success", "stopped_at_goal",
-        "final_distance_m", "final_orientation_rad", "contact_fraction", "return",
+        "final_distance_m", "contact_fraction", "return",
     ]  # fmt: skip
     objects = json.loads(results(directory, "json", capsys=capsys))
     assert len(objects) == len(rows)

@@ -16,7 +16,7 @@ from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.analysis import Summary
 from nested_agents.studies.results.statistics import Estimate
 
-TITLES = ["success", "evaluation success", "final orientation error [rad]", "time in contact"]
+TITLES = ["success", "evaluation success", "final orientation error [deg]", "time in contact"]
 LINES = [
     Summary(
         label,

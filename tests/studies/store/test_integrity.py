@@ -283,7 +283,7 @@ INVENTED = {
     "trials": "INSERT INTO trials SELECT 'x', condition, 99, state, error, recording_sha256, code "
     "FROM trials WHERE identity = ?",
     "episodes": "INSERT INTO episodes SELECT 'x', phase, episode, steps, success, stopped_at_goal, "
-    'final_distance_m, final_orientation_rad, contact_fraction, "return" '
+    'final_distance_m, contact_fraction, "return" '
     "FROM episodes WHERE identity = ?",
     "seconds": "INSERT INTO seconds SELECT 'x', decision, physics, sensors, learning, total "
     "FROM seconds WHERE identity = ?",

@@ -49,7 +49,7 @@ def test_what_was_saved_is_read_back_digit_by_digit(finished):
             assert (recording["box_pose"] == result.recordings["last"]["box_pose"]).all()
     assert names[2:] == [
         "seed", "phase", "episode", "steps", "success", "stopped_at_goal", "final_distance_m",
-        "final_orientation_rad", "contact_fraction", "return",
+        "contact_fraction", "return",
     ]  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def test_measures_can_be_written_down():
 
 def transition(reward=0.5, terminated=False, **info):
     measured = {
-        "distance_m": 0.3, "orientation_error_rad": 0.2, "contact_fraction": 0.75,
+        "distance_m": 0.3, "contact_fraction": 0.75,
         "stopped_at_goal": False,
         "robot_poses": np.zeros((2, 3)), "box_pose": np.ones(3), "goal_pose": np.ones(3),
         "wheel_speeds": np.zeros(4), "contact": np.array([True, False]),
@@ -71,7 +71,7 @@ def test_an_episode_is_summed_up_by_hand():
         "training", 3, 2,
         {
             "success": True, "stopped_at_goal": False, "final_distance_m": 0.3,
-            "final_orientation_rad": 0.2, "contact_fraction": 0.5,
+            "contact_fraction": 0.5,
         },
         0.75,
     )  # fmt: skip
