@@ -198,16 +198,16 @@ def changed_values(settings: Settings) -> dict[str, object]:
         value = values[name]
         default = None if field.is_required() else field.get_default(call_default_factory=True)
         if name == "kind" or field.is_required() or value != default:
-            changed[name] = _changed(value, table[name])
+            changed[name] = _without_defaults(value, table[name])
     return changed
 
 
-def _changed(value: object, dumped: object) -> object:
-    """Return a value fit for JSON, its settings without their defaults."""
+def _without_defaults(value: object, dumped: object) -> object:
+    """Return a value of a settings field for JSON; nested settings are without their defaults."""
     if isinstance(value, Settings):
         return changed_values(value)
     if isinstance(value, tuple) and isinstance(dumped, list):
-        return [_changed(item, own) for item, own in zip(value, dumped, strict=True)]
+        return [_without_defaults(item, own) for item, own in zip(value, dumped, strict=True)]
     return dumped
 
 

@@ -31,9 +31,9 @@ from .prediction.prediction import BoxPrediction, PredictionSettings, PresentSta
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
 from .prediction.twists import mean_twists
+from .states.kernel import progress_of
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
-from .states.variables import progress_of
 from .world.boxes import box_for, growth
 from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for

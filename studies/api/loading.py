@@ -17,7 +17,7 @@ from ..results.foreign_tables import ScoreColumns, parse_roles, read_scores
 from ..results.joining import combine, join_parts
 from ..results.json_files import read_json
 from ..results.marl_eval import Runs, is_exported_by, join_runs, read_runs, results_of_runs
-from ..results.published import Header
+from ..results.results_file import Header
 from ..results.score_tables import SUFFIXES, ScoreTable, read_table, table_of
 from ..results.scores import Better, ScoreResults
 from ..spec.outline import StudyOutline
@@ -214,7 +214,7 @@ def _results_of(
 
 def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better) -> StudyResults:
     """Return the results of a table of scores, or of an exported one; messages name its file."""
-    header = Header.beside(path) if path else None
+    header = Header.in_folder_of(path) if path else None
     is_listed = header is not None and path is not None and path.name in header.files
     with refused(f"{path}: " if path else ""):
         if is_exported(table, is_listed=is_listed) and roles.keys() <= {"score"}:
@@ -229,7 +229,7 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
 
 def _of_runs(runs: Runs, path: Path, better: Better) -> StudyResults:
     """Return the results of runs of the form of marl-eval."""
-    header = Header.beside(path)
+    header = Header.in_folder_of(path)
     notes: tuple[str, ...] = ()
     if header is not None and not is_exported_by(runs, header):
         notes = header.remarks(path) if path.name in header.files else ()

@@ -167,7 +167,7 @@ def tune(
         observer.note(f"compared {count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
         names = [name for name in table["name"] if name in names]
     best = configurations[table["name"].iloc[0]]
-    tuned = _changed(spec, best)
+    tuned = _with_configuration(spec, best)
     durable.write(out / BEST_FILE, dumps(tuned.table()).encode())
     durable.write(out / TABLE_FILE, table.to_csv(index=False).encode())
     finalists = load(out).where(f"condition in {[GIVEN, *names, *CONTROLS]}")
@@ -215,7 +215,7 @@ def _merged(table: TomlTable, configuration: Configuration) -> TomlTable:
     return reduce(override, starmap(nested, configuration.items()), table)
 
 
-def _changed(spec: Spec, configuration: Configuration) -> Spec:
+def _with_configuration(spec: Spec, configuration: Configuration) -> Spec:
     """Return a spec with the values of a configuration, without its table ``[tune]``."""
     table = {key: value for key, value in spec.table().items() if key != "tune"}
     return Spec.of(_merged(table, configuration), spec.sources)
@@ -232,13 +232,13 @@ def _space(spec: Spec) -> dict[str, Sequence[object]]:
     if spec.tune:
         for key, values in spec.tune.items():
             for value in values:
-                _changed(spec, {key: value})  # refuses unknown keys and values
+                _with_configuration(spec, {key: value})  # refuses unknown keys and values
         return dict(spec.tune)
     possible: dict[str, list[object]] = {}
     for key, usual in USUAL.items():
         for value in usual:
             with suppress(SpecError):
-                _content(_changed(spec, {key: value}))
+                _content(_with_configuration(spec, {key: value}))
                 possible.setdefault(key, []).append(value)
     return dict(possible)
 
@@ -254,7 +254,7 @@ def _sample(spec: Spec, trials: int, draw: int) -> dict[str, Configuration]:
             break
         changes = {key: values[int(rng.integers(len(values)))] for key, values in space.items()}
         try:
-            drawn.setdefault(_content(_changed(spec, changes)), changes)
+            drawn.setdefault(_content(_with_configuration(spec, changes)), changes)
         except SpecError as error:
             problem = str(error)
     if len(drawn) == 1:

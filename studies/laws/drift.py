@@ -94,7 +94,7 @@ def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: 
     terms = u[:, :rank]
     there = (vt @ slope)[:rank] / s[:rank]
     places = np.append(x, at) - x[0]
-    walk = _integrated_wiener(places)
+    walk = integrated_wiener(places)
     scales = SIGMAS**2
     # Below, the first axis is that of SIGMAS.
     inverse = np.linalg.inv(scales[:, None, None] * walk[:-1, :-1] + np.diag(noise + EXACT))
@@ -114,7 +114,7 @@ def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: 
     return Drift(weights / weights.sum(), shifts, extra)
 
 
-def _integrated_wiener(x: Array) -> Array:
+def integrated_wiener(x: Array) -> Array:
     """Return covariances ``(m, m)`` at places beyond zero: ``a^2 (3 b - a) / 6`` for ``a <= b``."""
     least = np.minimum.outer(x, x)
     most = np.maximum.outer(x, x)

@@ -196,10 +196,13 @@ def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:
         noise = float((left[seen] ** 2).mean())
         scatter = noise
         deviation = math.sqrt(noise)
-        z = left[~seen] / deviation  # mean of a normal distribution beyond the censored value
-        hazard = np.exp(-0.5 * z**2 - 0.5 * math.log(2.0 * math.pi) - special.log_ndtr(-z))
-        left[~seen] = deviation * hazard
+        left[~seen] = deviation * mean_of_tail(left[~seen] / deviation)
     return Law(curve, sample, parameters, resampled, noise, left.mean(axis=0), scatter)
+
+
+def mean_of_tail(z: Array) -> Array:
+    """Return the mean of a standard normal variable that is known to exceed each z."""
+    return np.exp(-0.5 * z**2 - 0.5 * math.log(2.0 * math.pi) - special.log_ndtr(-z))
 
 
 def _variance(values: Array, weights: Array) -> float:

@@ -88,7 +88,7 @@ def replays(
 
     Recordings without a player are shown as animations, one for each condition.
     """
-    reached = _reached(results)
+    reached = _training_successes(results)
     done = {(condition, seed) for condition, seed, _ in reached}
     scenes = list[Json]()
     episodes = list[Json]()
@@ -179,7 +179,7 @@ def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
     return None, {}
 
 
-def _reached(results: Results) -> Mapping[tuple[str, int, int], bool]:
+def _training_successes(results: Results) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode succeeded, by condition, seed and number.
 
     Episodes in many parallel environments count as failures, because their success is unknown.

@@ -13,8 +13,8 @@ from ...core.interface.measures import NO_SUCCESS, RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import show
 from ..spec.tables import SpecTable
-from .published import Header
 from .results import DONE, TRIAL_COLUMNS, assemble
+from .results_file import Header
 from .score_tables import NUMBER, ScoreTable
 from .scores import (
     KEYS,

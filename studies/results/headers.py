@@ -11,8 +11,9 @@ from pathlib import Path
 from ..spec.outline import StudyOutline
 from ..store.durable import read_text
 from .json_files import CHECKSUM, checksum, in_lines
-from .published import HEADER, header
+from .published import header
 from .results import Results
+from .results_file import HEADER
 
 
 def describe(

@@ -23,8 +23,8 @@ from ...core.interface.measures import NO_SUCCESS, RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ..errors import SpecError
 from .json_files import Finite, Json, explain
-from .published import Header
 from .results import Results
+from .results_file import Header
 from .scores import (
     KEYS,
     LAST_STEP,

@@ -30,7 +30,7 @@ class KeySchema(GenerateJsonSchema):
     """Generator of the schema of settings, with the docstrings of their fields."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> Schema:
-        """Return the schema of a model."""
+        """Return the schema of a settings model, with the docstrings of its fields."""
         table = super().model_schema(schema)
         for name, key in table.get("properties", {}).items():
             if text := field_docstring(schema["cls"], name):

@@ -16,9 +16,9 @@ from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray
 from ....core.search.best_response import RespondingPrediction, Responses, Search
 from ....core.values.rule_base import RuleBase
+from ..states.kernel import progress_of
 from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
-from ..states.variables import progress_of
 from ..world.reward import Task, reward
 from ..world.settings import InfraredSettings
 from .calibration import PushBelief, model_of, outcomes

@@ -16,8 +16,8 @@ from ....core.interface.prediction import Exploring
 from ....core.numerics import FloatArray, IntArray, njit
 from ....core.search.drawing import choose_action, draw
 from ....core.values.triangular import summed_values
+from ..states.kernel import Columns, evaluate
 from ..states.situations import SituationBatch
-from ..states.variables import Columns, evaluate
 from .models import PushModel
 from .push import push
 from .wheel_commands import WheelCommands, robot_actions, speeds_of

@@ -14,8 +14,9 @@ import numpy as np
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics import FloatArray
 from ...state_variables import StateVariable, find_variable, space_of
+from .kernel import Columns, columns_of, evaluate
 from .situations import SituationBatch, whole_batch
-from .variables import STATE_VARIABLES, Columns, columns_of, evaluate
+from .variables import STATE_VARIABLES
 
 
 @dataclass(frozen=True)

@@ -248,7 +248,7 @@ def _contents(store: Store, form: Files, folder: Path) -> dict[str, bytes]:
     """Return the content of each file by its name, see `results.published`."""
     from ...catalogue.study import select_published
     from ...presentation.tables import in_csv, in_parquet
-    from ...results import headers, marl_eval, published
+    from ...results import headers, marl_eval, published, results_file
     from ...results.results import read
     from ...results.scores import PHASES
 
@@ -269,7 +269,7 @@ def _contents(store: Store, form: Files, folder: Path) -> dict[str, bytes]:
         files = {f"{name}.csv": in_csv(frame).encode() for name, frame in frames.items()}
     else:
         files = {f"{name}.parquet": in_parquet(frame) for name, frame in frames.items()}
-    return files | {published.HEADER: headers.describe(outline, results, files, folder)}
+    return files | {results_file.HEADER: headers.describe(outline, results, files, folder)}
 
 
 @click.command()

@@ -59,6 +59,13 @@ def test_late_messages_say_what_was_done_before() -> None:
     assert heard(made, 3) == {0: 3, 2: 0}
 
 
+def test_each_delay_has_its_own_length_and_one_decision_by_default() -> None:
+    made = messages(DelayedMessages(agents="a"), DelayedMessages(agents="b", decisions=3))
+    for past in ([1, 3, 0, 0], [2, 2, 0, 0], [0, 1, 0, 0]):
+        made.advance(np.array(past))
+    assert heard(made, 3) == {0: 0, 1: 3, 2: 0}
+
+
 def test_noise_alters_what_is_said_by_whom_it_befalls_alone() -> None:
     made = messages(NoisyMessages(agents="b", probability=1.0))
     said = [heard(made, 3) for _ in range(400)]

@@ -286,3 +286,23 @@ def test_a_prediction_is_the_law_itself() -> None:
 def test_predictions_stay_within_the_bounds_of_a_measure() -> None:
     sample = samples.of_numbers(SIZES, drawn(lambda n: 0.3 * n**0.25), (0.0, 1.0))
     assert [float(end) for end in fitting.choose(sample).predict(1e4)][::2] == [1.0, 1.0]
+
+
+def test_rates_of_no_and_of_every_episode_are_rates() -> None:
+    rates = samples.of_rates(np.array([2.0]), np.array([[0.0], [1.0]]), 4)
+    np.testing.assert_allclose(rates.values[:, 0], [-2.0, 2.0])  # slope of the logit at 1/2: 4
+    for wrong in (-0.1, 1.1):
+        with pytest.raises(ValueError, match="outside of 0 to 1"):
+            samples.of_rates(np.array([2.0]), np.array([[wrong], [0.5]]), 4)
+
+
+def test_the_mean_of_a_normal_tail() -> None:
+    drawn = np.random.default_rng(0).normal(size=1_000_000)
+    expected = [np.sqrt(2.0 / np.pi), drawn[drawn > 1.0].mean()]
+    np.testing.assert_allclose(fitting.mean_of_tail(np.array([0.0, 1.0])), expected, rtol=2e-3)
+
+
+def test_the_covariance_of_an_integrated_random_walk() -> None:
+    """The integral of a Wiener process has variance 1/3 at 1, 8/3 at 2, and covariance 5/6."""
+    expected = np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 5.0], [0.0, 5.0, 16.0]]) / 6.0
+    np.testing.assert_allclose(drift.integrated_wiener(np.array([0.0, 1.0, 2.0])), expected)

@@ -9,7 +9,7 @@ import pytest
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
-from nested_agents.studies.results.published import MAX_VALUES
+from nested_agents.studies.results.results_file import MAX_VALUES
 from nested_agents.studies.store.database import RESULTS_VERSION
 
 SPEC = {

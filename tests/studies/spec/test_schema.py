@@ -36,6 +36,11 @@ def test_it_is_a_schema_of_every_spec() -> None:
         assert [*validator.iter_errors(table)] == [], path
 
 
+def test_the_committed_schema_is_that_of_the_code() -> None:
+    committed = (ROOT / "examples" / "spec.schema.json").read_text(encoding="utf-8")
+    assert json.loads(committed) == json.loads(json.dumps(schema())), "run ./dev generate"
+
+
 def test_the_examples_name_one_that_fits() -> None:
     for path in EXAMPLES:
         first, _, rest = path.read_text(encoding="utf-8").partition("\n")

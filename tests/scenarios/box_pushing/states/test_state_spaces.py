@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from variables_oracle import batch_of
 
-from nested_agents.core.numerics import wrap, wrap_one
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -129,16 +128,6 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
         mirrored = EVERY.shared(batch, [robot])[0][0]
         signs = [1 if each.mirrored == "same" else -1 for each in EVERY.space.shared]
         np.testing.assert_allclose(mirrored, seen * signs, atol=1e-12)
-
-
-def test_angles_wrap() -> None:
-    np.testing.assert_allclose(wrap(np.array([0.0, 3 * pi, -1.5 * pi])), [0.0, -pi, 0.5 * pi])
-
-
-def test_wrap_is_the_remainder_to_the_last_bit() -> None:
-    angles = np.random.default_rng(0).uniform(-300, 300, 100_000)
-    np.testing.assert_array_equal(wrap(angles), (angles + pi) % (2 * pi) - pi)
-    np.testing.assert_array_equal([wrap_one(angle) for angle in angles], wrap(angles))
 
 
 @pytest.mark.parametrize("name", STATE_SPACES)

@@ -6,13 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from variables_oracle import batch_of, variables
 
+from nested_agents.scenarios.box_pushing.states.kernel import progress_of
 from nested_agents.scenarios.box_pushing.states.situations import (
     SituationBatch,
     angle_of,
     whole_batch,
 )
 from nested_agents.scenarios.box_pushing.states.state_spaces import build_space
-from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES, progress_of
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 
