@@ -405,7 +405,7 @@ def games() -> Figure:
         axes.text(
             column, row, format_number(table[row, column]), ha="center", va="center", size=8.5
         )
-    labels = [f"{game}, {exploration}" for game, exploration in settings]
+    labels = [f"{g.replace(':', ' ')}, {e.replace('b', 'B', 1)}" for g, e in settings]
     axes.set_yticks(range(len(settings)), labels)
     axes.set_xticks(range(len(systems)), systems, rotation=45, ha="right", rotation_mode="anchor")
     axes.spines[:].set_visible(False)
@@ -428,9 +428,12 @@ def wheel_failure() -> Figure:
             condition = f"4 wheels, {fault}, enabled={enabled}"
             success = results.success(condition, phase)
             first = 32 - success.shape[1]
-            groups = [(e, na.rate(success[:, e : e + 4])) for e in range(0, success.shape[1], 4)]
-            x = [first + e + 2.5 + 0.15 * line for e, _ in groups]
-            draw_points(axes, x, [rate for _, rate in groups], line, label)
+            for start, end in ((0, 20 - first), (20 - first, 32 - first)):
+                groups = [(e, na.rate(success[:, e : e + 4])) for e in range(start, end, 4)]
+                x = [first + e + 2.5 + 0.15 * line for e, _ in groups]
+                if groups:  # not joined across the failure
+                    name = label if end == 32 - first else "_"
+                    draw_points(axes, x, [rate for _, rate in groups], line, name)
         axes.axvline(20.5, color="black", lw=1, ls=":")
         axes.text(20, 0.02, "failure", ha="right", va="bottom")
         axes.set(xlabel="episode", title=f"one wheel {fault}", ylim=(-0.03, 1.08))

@@ -13,7 +13,7 @@ import nested_agents as na
 
 
 class Tank(na.Scenario):
-    """Pumps fill or empty one tank until it holds what is wanted; each agent drives a pump."""
+    """Pumps fill or empty one tank up to a target volume; each agent drives a pump."""
 
     class Settings(na.ScenarioSettings):
         """The ``[scenario]`` table of a spec."""
@@ -27,7 +27,7 @@ class Tank(na.Scenario):
 
     def __init__(self, settings=Settings()):  # noqa: B008 - frozen
         self.agents = tuple(f"pump{i + 1}" for i in range(settings.pumps))
-        # Whatever it did before, a pump now gives 1 l/s, takes 1 l/s or rests.
+        # The actions do not depend on the last flow: add 1 l/s, remove 1 l/s, or rest.
         self.action_set = na.ActionSet(("in", "out", "rest"), (0, 0, 0), (1, -1, 0), neutral=2)
         flow = na.Variable("flow", "l/s", -1.0, 1.0)
         missing = na.Variable("missing", "l", -20.0, 20.0, centers=(-20.0, -5.0, 0.0, 5.0, 20.0))
@@ -55,7 +55,7 @@ class Tank(na.Scenario):
         return self
 
     def after(self, joint_actions):
-        """Return flows and what is missing after joint actions ``(..., n)``."""
+        """Return flows and missing volume after joint actions ``(..., n)``."""
         one = np.ones(len(self.agents))
         flows = self.action_set.apply(self.flows, joint_actions, one, one)
         return flows, np.clip(self.missing - flows.sum(axis=-1), -20.0, 20.0)
@@ -66,7 +66,7 @@ class Tank(na.Scenario):
 
 
 class Forecast(na.Prediction):
-    """What joint actions would lead to. No more is needed; the reward is for planners."""
+    """Predicted states, and rewards, which only planners need."""
 
     def __init__(self, tank):
         self.tank = tank

@@ -124,18 +124,18 @@ _backend = click.option(
     "--backend",
     type=click.Choice(["loky", "dask"]),
     default="loky",
-    help="Who runs the trials: loky, processes of this machine, or dask, workers of a Dask cluster "
-    "(extra nested-agents[dask]). The results are the same.",
+    help="Run the trials in processes of this machine (loky) or in workers of a Dask cluster "
+    "(dask; extra nested-agents[dask]). The results are the same.",
 )
 _address = click.option(
     "--address",
     metavar="tcp://HOST:PORT",
-    help="Address of the scheduler of a running Dask cluster; all its workers are used unless "
-    "--jobs says otherwise. By default, a local cluster is started.",
+    help="Address of the scheduler of a running Dask cluster; --jobs limits the number of its "
+    "workers. By default, a local cluster is started.",
 )
 _accept_code = flag(
     "--accept-code",
-    "Go on with a study although the installed code that computes it has changed since.",
+    "Continue a study although the installed code that computes it has changed.",
 )
 
 
@@ -157,14 +157,14 @@ checkpoint = number(
     "--checkpoint",
     "SECONDS",
     300.0,
-    "Interval at which a running trial saves its state, so that it resumes after an interruption "
-    "to the same results; 0: never.",
+    "Interval at which a running trial saves its state [s]; after an interruption it resumes from "
+    "there, with the same results. 0: never.",
 )
 
 trust = flag(
     "--trust",
     "Trust the code of the study, now and later: run the Python files that came with it and import "
-    "the modules that it names. This code can do whatever you can.",
+    "the modules that it names. This code has all of your permissions.",
 )
 """Whether a study may run the code that it contains or names, see `core.plugins.trust`."""
 
@@ -182,12 +182,12 @@ figures = click.option(
     multiple=True,
     type=click.Choice(["png", "svg", "pdf"]),
     metavar="png|svg|pdf...",
-    help="Also draw the figures of the study, in these formats. The report draws them in any case.",
+    help="Also write the figures of the study in these formats. The report always has them.",
 )
 """Formats of the figures of a study."""
 
 plot = click.option(
-    "--plot", type=PATH, metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
+    "--plot", type=PATH, metavar="PATH", help="Write a figure: SVG, PNG or PDF by suffix."
 )
 """A picture to write."""
 
@@ -195,22 +195,22 @@ as_study = click.option(
     "--as",
     "study",
     metavar="STUDY",
-    help="Analyse the trials as this study does, by its name or file.py:NAME; nothing is run.",
+    help="Analyze the trials as another study (a name or file.py:NAME); nothing is run.",
 )
 """Another study than that which the trials were run for."""
 
 where = click.option(
     "--where",
-    metavar="CHOICE",
-    help="Only the trials of a choice, a query of pandas: \"robots == 8 and box == 'circle'\".",
+    metavar="QUERY",
+    help="Use only trials that match a pandas query: \"robots == 8 and box == 'circle'\".",
 )
 """A part of the trials, see `nested_agents.studies.results.results.chosen`."""
 
 measure = click.option(
     "--measure",
     metavar="NAME",
-    help="A measure of episodes, steps, return, or a number of whole trials, as messages; by "
-    "default the first, success (return where nothing is one), or the first score of a table.",
+    help="Measure of episodes (such as steps or return) or of trials (such as messages). By "
+    "default success, return if no episode can succeed, or the first score of a table.",
 )
 """Measure that is compared or fitted."""
 
@@ -226,8 +226,8 @@ columns = click.option(
     "--columns",
     multiple=True,
     metavar="ROLE=COLUMN",
-    help="Columns of a table of scores by role, with commas between: condition and score (each may "
-    "be several, as condition=model+topology), seed, item; by default those of these names.",
+    help="Columns of a table of scores by role, separated by commas. Roles are condition, score, "
+    "seed and item; condition=model+topology joins columns. By default, names are the roles.",
 )
 """Roles of the columns of a table, see `nested_agents.studies.api.loading.load`."""
 

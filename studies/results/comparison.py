@@ -80,7 +80,7 @@ class ComparisonTable(NamedTuple):
         lines = verdicts(groups, self.measure, self.title)
         left_out = "; ".join(text for group in self.groups for text in group.left_out)
         if left_out:
-            lines += wrapped(f"Without a partner and left out of the difference: {left_out}.")
+            lines += wrapped(f"Left out of differences, because they have no partner: {left_out}.")
         if self.measure.name in RECOVERY:
             lines += self._without_success()
         compared = {c for group in self.groups for c in group.members.values()}
@@ -187,7 +187,7 @@ def _group(
         if name in by_name:
             estimates |= _difference_columns(by_name[name], measure)
             count = _left_out(results, values[condition], base) if by_name[name].paired else ""
-            left_out += [f"{title}, {count}"] if count else []
+            left_out += [f"{members[0][0]} and {title}, {count}"] if count else []
         lines.append(Summary(title, len(values[condition]), estimates))
     return ComparisonGroup(
         setting=setting,

@@ -174,6 +174,8 @@ def read_table(path: Path) -> ScoreTable:
         return _records_table(read_json(read_text(path), JsonNumber))
     except ImportError:
         raise SpecError(f"{path}: Parquet is read by pyarrow: pip install pyarrow") from None
+    except FileNotFoundError:
+        raise SpecError(f"{path}: no such file") from None
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
     except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:

@@ -122,26 +122,27 @@ def predict(
         check_size("predict", n)
         if n in run:
             raise SpecError(f"predict = {n}: was run; name sizes that were not")
-    numbers = [cost.number for cost in COSTS.values() if cost.number]
+    headings = {cost.number: cost.heading for cost in COSTS.values() if cost.number}
     predictions: list[SizePrediction] = []
     remarks: list[str] = []
     seeds: list[int] = []
-    for name in dict.fromkeys((measure, TIME, *numbers)):
+    for name in dict.fromkeys((measure, TIME, *headings)):
         try:
             growth = scaling_law(results, name, size=axis.key, predict=sizes)
         except SpecError:
             if name == measure:
                 raise
             continue  # was not measured
+        title = headings.get(name, growth.title)
         for fitted in growth.fits:
             hierarchy = fitted.group or ALL_TEAMS
             if fitted.law is None:
-                remarks.append(f"{hierarchy}: {growth.title} is not predicted: {fitted.why}.")
+                remarks.append(f"{hierarchy}: {title} is not predicted: {fitted.why}.")
                 continue
             seeds.append(fitted.law.seeds)
             for n in sizes:
                 ends = map(float, fitted.law.predict(n, LEVEL))
-                predictions.append(SizePrediction(name, growth.title, hierarchy, float(n), *ends))
+                predictions.append(SizePrediction(name, title, hierarchy, float(n), *ends))
     if not predictions:
         raise SpecError(f"predict: no measure has a law; {' '.join(remarks)}")
     plain = json.loads(json.dumps(spec))

@@ -308,7 +308,7 @@ class TeamOptions(TypedDict):
     "--per",
     type=click.Choice(["actuator", "body", "team"]),
     default="actuator",
-    help="What there is one agent for, as the key agents of a spec says.",
+    help="One agent per actuator, per body or for the team, as the key agents of a spec.",
 )
 @click.option(
     "--actions", type=click.IntRange(2), metavar="N", default=4, help="Actions of each actuator."
@@ -316,7 +316,7 @@ class TeamOptions(TypedDict):
 @click.option(
     "--scenario",
     metavar="KIND",
-    help="Over the agents of a scenario with its default settings, as spread or signals.",
+    help="Use the agents of a scenario with its default settings, such as spread or signals.",
 )
 @options.formats("table", "json")
 @options.plot

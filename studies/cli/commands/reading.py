@@ -73,8 +73,8 @@ def table(
 ) -> int:
     """Print conditions against estimates with their 95% intervals, as at the end of a run.
 
-    DIR is where a study is kept; several are analysed together, as the first one says. FILE.json is
-    a file of results that `export --format json` has written.
+    DIR is the folder of a study. Several studies are analyzed together, in the way of the first.
+    FILE.json is a file of results that `export --format json` has written.
     """
     results = load_results(sources, study=study, where=where, trust=trust)
     if form == "table":
@@ -98,17 +98,17 @@ class Compared(TypedDict):
 @click.option(
     "--by",
     metavar="KEY",
-    help="Compare conditions that differ in this swept key alone, as robots or topology; "
-    "directory compares studies. By default (condition) all conditions with the first.",
+    help="Compare conditions that differ only in this swept key, such as topology, or studies by "
+    "directory. By default (condition) all conditions are compared with the first.",
 )
 @options.measure
 @options.phase
 @click.option(
-    "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
+    "--reference", metavar="LABEL", help="Condition to compare with; by default the first."
 )
 @options.flag(
     "--statistics",
-    "Add interquartile mean and probability of improvement, over the groups of --by as tasks.",
+    "Add interquartile mean and probability of improvement; the groups of --by are the tasks.",
 )
 @options.plot
 @options.where
@@ -118,7 +118,7 @@ class Compared(TypedDict):
     type=click.Choice(["higher", "lower"]),
     help="Which scores of other tools are better; by default higher ones.",
 )
-@options.out("A page to write: verdicts, table, statistics and figure.", "FILE.html")
+@options.out("Write a page with verdicts, table, statistics and figure.", "FILE.html")
 @options.form
 @options.trust
 def compare(
@@ -135,11 +135,11 @@ def compare(
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
-    DIR is where a study is kept, FILE.json a file of results, of marl-eval too. Conditions are
-    compared on the seeds that both have, on equal worlds.
+    DIR is the folder of a study, FILE.json a file of results of this tool or of marl-eval.
+    Conditions are compared on the seeds that both have, in the same environments.
 
-    FILE may also be a table of scores that others have measured, .csv, .jsonl or .parquet: a row
-    for each score of a condition, by run (seed), or on an item, or both.
+    FILE may also be a table of scores of another tool, .csv, .jsonl or .parquet, with one score a
+    row. A score belongs to a condition and to a run (seed), an item, or both.
     """
     loaded = read_results(sources, where=where, trust=trust, columns=columns, better=better)
     comparison = loaded.compare(**compared)
@@ -173,13 +173,13 @@ def compare(
     "--phase",
     metavar="PHASE",
     default="training",
-    help="The episodes of training, those of the greedy evaluation after it (evaluation), of a "
-    "stage before it (training:NAME) or of another evaluation (evaluation:NAME).",
+    help="Episodes to print: training, evaluation (greedy, after training), training:NAME (a "
+    "stage before it) or evaluation:NAME (another evaluation).",
 )
 def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) -> int:
     """Print one row per trial and episode, as a table, CSV or JSON.
 
-    DIR is where the study is kept.
+    DIR is the folder of the study.
     """
     from ....core.plugins.words import closest
     from ...presentation.tables import write_rows
@@ -207,16 +207,16 @@ Files = Literal["csv", "parquet", "json", "marl-eval"]
     "parquet",
     "json",
     "marl-eval",
-    text="Of the files; distances and returns are left out of json.",
+    text="Format of the files; json leaves out distances and returns.",
 )
-@options.out("Folder of the files; by default export in the study's own.", "PATH")
-@click.option("--overwrite", is_flag=True, help="Replace files that are there.")
+@options.out("Folder for the files; by default the subfolder export of DIR.", "PATH")
+@click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.trust
 def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trust: bool) -> int:
     """Write one file with a row for every episode, and one with a row for every trial.
 
-    DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
-    to be published with a paper; the command table reads it.
+    DIR is the folder of the study. JSON is one small file of spec, seeds and rounded measures, to
+    publish with a paper; the command table reads it.
     """
     folder = directory / "export" if out is None else out
     if trust:

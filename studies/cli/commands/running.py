@@ -19,7 +19,7 @@ class Rerun(options.RunOptions):
 
 @click.command()
 @options.out(
-    "Where to keep the study; made if it does not exist. The same command again continues it.",
+    "Folder of the study, created if it does not exist. The same command resumes the study.",
     default="nested-agents-demo",
 )
 @options.jobs
@@ -65,8 +65,8 @@ def demo(out: Path, jobs: int | None, print_spec: bool) -> int:
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.out(
-    "Where to keep the study; made if it does not exist. Every trial is kept the moment it "
-    "finishes, so interrupting costs only those that are running.",
+    "Folder of the study, created if it does not exist. Every trial is saved as soon as it ends, "
+    "so an interruption costs only the trials that are running.",
     required=True,
 )
 @options.running
@@ -123,13 +123,13 @@ class TuneOptions(Budget, options.RunOptions):
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.out(
-    "Where to keep the study of all configurations, best.toml and configurations.csv.",
+    "Folder for the study of all configurations, best.toml and configurations.csv.",
     required=True,
 )
 @options.number("--trials", "N", 20, "Configurations to try, the spec's own among them.")
-@options.number("--seeds", "N", 16, "On which the last ones are compared.")
-@options.number("--first-seed", "N", 10_000, "Of these seeds; at least 10000.")
-@options.number("--draw", "N", 0, "Seed of the draw.")
+@options.number("--seeds", "N", 16, "Number of seeds on which the last configurations are compared.")
+@options.number("--first-seed", "N", 10_000, "First of these seeds; at least 10000.")
+@options.number("--draw", "N", 0, "Seed with which configurations are drawn.")
 @options.running
 @options.trust
 @options.changes
@@ -205,7 +205,7 @@ def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[S
 def retry(directory: Path, trust: bool, **running: Unpack[Rerun]) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
-    DIR is where the study is kept.
+    DIR is the folder of the study.
     """
     from ...api.running import run
     from ...presentation.progress import Terminal
