@@ -114,7 +114,7 @@ def test_scores_are_paired_by_seed_and_item(scores) -> None:
     comparison = na.compare_table(fewer, score="tokens", **ROLES)
     assert [float(d.estimate.value) for d in comparison.differences] == pytest.approx([6.0, 3.0])
     said = " ".join(" ".join(comparison.notes).split())
-    assert "ring, 2 of 62 scores; star, 1 of 63 scores" in said
+    assert "chain and ring, 2 of 62 scores; chain and star, 1 of 63 scores" in said
     killed = scores[(scores["topology"] != "star") | (scores["run"] > 0)]
     comparison = na.compare_table(killed, score="tokens", **ROLES)
     assert [d.seeds for d in comparison.differences] == [8, 7]
