@@ -32,7 +32,7 @@ def test_the_rates_of_the_readme_are_published() -> None:
     )
     assert f"eight robots succeed in {without} of the episodes instead of {chain}" in TEXT
     sixteen = format_number(load("scaling").results.success("16", "evaluation").mean())
-    assert f"(32 agents) with a success of {sixteen} if" in TEXT
+    assert f"trained with 16 robots, they succeed in {sixteen} of the episodes" in TEXT
     results = (ROOT / "research" / "notebooks" / "box_pushing.md").read_text(encoding="utf-8")
     assert "or 0.62 [" in results
     assert "dynamics model from zero reach 0.97" in results
