@@ -260,11 +260,12 @@ def _in_two_lines(name: str) -> str:
     r"""Return a name in at most two lines, without its middle if it is too long.
 
     >>> _in_two_lines("robot1.left"), _in_two_lines("north.junction12")
-    ('robot1.left', 'north.ju\nnction12')
+    ('robot1.left', 'north.\njunction12')
     """
     if len(name) <= MAX_CHARACTERS:
         return name
     if len(name) <= 2 * MAX_CHARACTERS:
-        half = -(-len(name) // 2)
+        end = name.rfind(".", 0, MAX_CHARACTERS) + 1
+        half = end if len(name) - end <= MAX_CHARACTERS else -(-len(name) // 2)
         return f"{name[:half]}\n{name[half:]}"
     return f"{name[: MAX_CHARACTERS - 1]}…\n{name[-MAX_CHARACTERS:]}"
