@@ -127,7 +127,7 @@ class TuneOptions(Budget, options.RunOptions):
     required=True,
 )
 @options.number("--trials", "N", 20, "Configurations to try, the spec's own among them.")
-@options.number("--seeds", "N", 16, "Number of seeds on which the last configurations are compared.")
+@options.number("--seeds", "N", 16, "Number of seeds that compare the last configurations.")
 @options.number("--first-seed", "N", 10_000, "First of these seeds; at least 10000.")
 @options.number("--draw", "N", 0, "Seed with which configurations are drawn.")
 @options.running
