@@ -93,6 +93,12 @@ def test_a_linear_world_is_predicted_to_rounding(roles: tuple[str, ...]) -> None
         assert guessed == pytest.approx(states, abs=1e-4)
 
 
+def test_own_variables_are_rounded_to_a_thousandth_of_their_range() -> None:
+    predictor, _ = trained(Rails(2))  # speeds from -1 to 1 m/s
+    steps = predictor.reached(np.array([[0.1234, 0.0, 0.0], [-0.3217, 0.0, 0.0]])) / 0.002
+    np.testing.assert_allclose(steps, np.round(steps), rtol=0, atol=1e-9)
+
+
 def test_what_is_held_goes_on_and_angles_wrap() -> None:
     scenario = Rails(1)
     predictor, _ = trained(scenario, LEARNED.model_copy(update={"horizon": 3}))

@@ -46,6 +46,7 @@ def test_predictions_hold_for_the_same_law_and_fail_for_another(tables):
     assert "2 of 2 predictions held" in same.notes[0]
     other = check(file, load(tables / "other.csv").results, {})
     assert not any(own.has_held for own in other.checked)
+    assert "0 of 2 predictions held" in other.notes[0]
     assert "Not held: all teams, 16" in other.notes[1]
 
 

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,9 @@ import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results.results import from_arrays
+from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.scalability import analysis as analysis_module
+from nested_agents.studies.scalability.figure import MAX_EFFICIENCY, draw
 from nested_agents.studies.scalability.report import analyze
 
 RESULTS = Path(__file__).parents[3] / "research" / "results"
@@ -72,6 +76,34 @@ def test_the_scaling_may_be_named():
         na.load(SCALING).scalability(scaling="other")
 
 
+def test_the_paragraph_says_how_the_task_grows():
+    weak, strong = (na.load(SCALING).scalability(scaling=s).analysis for s in ("weak", "strong"))
+    assert "grows with the team (weak scaling)" in weak.paragraph
+    assert "the same for all sizes (strong scaling)" in strong.paragraph
+
+
+def test_numbers_of_whole_trials_leave_the_times_of_evaluation():
+    study = na.load(SCALING)
+    usual, other = (study.scalability(m).analysis for m in (None, "messages"))
+    assert other.data.performance.name == "messages"
+    assert other.speedups.keys() == usual.speedups.keys()
+
+
+@pytest.mark.parametrize(
+    ("best", "expected"),
+    [
+        ((20.0, 1.0, 30.0), "no best team size"),
+        ((20.0, 1.2, 30.0), "more than 1 robots"),
+        ((20.0, 16.0, 30.0), "more than 16 robots"),
+        ((8.0, 2.5, np.inf), "2 robots or more"),
+        ((8.0, 6.0, 10.0), "at its maximum with 8 [6, 10] robots"),
+    ],
+)
+def test_the_place_of_the_maximum_throughput_in_words(best, expected):
+    law = SimpleNamespace(best_size=Estimate(*map(np.asarray, best)), is_plausible=True)
+    assert expected in analysis_module._place(law, 16.0, "robots")
+
+
 def test_a_crossover_is_found_with_its_interval(table):
     report = load(table).scalability(size="agents")
     (crossover,) = report.analysis.crossovers
@@ -118,6 +150,12 @@ def test_the_table_has_all_forms(form, capsys):
     output = capsys.readouterr().out
     assert "efficiency" in output
     assert max(map(len, output.splitlines())) <= 80 or form != "table"
+
+
+def test_the_figure_shows_all_efficiencies_and_fills_points_on_the_front():
+    _, efficiency, _, front = draw(na.load(SCALING).scalability().analysis).axes
+    assert efficiency.get_ylim()[1] >= MAX_EFFICIENCY
+    assert [line.get_markerfacecolor() for line in front.lines] == ["#0072B2"]
 
 
 def test_the_figure_is_written(tmp_path, capsys):
