@@ -26,7 +26,7 @@ from nested_agents.studies.results.results import (
     describe_number,
     from_arrays,
 )
-from nested_agents.studies.results.statistics import NOT_NEGATIVE, Estimate, bootstrap
+from nested_agents.studies.results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 
 
 def within(estimate: Estimate, bounds: tuple[float, float]) -> bool:
@@ -174,6 +174,17 @@ def test_newcombe_by_hand() -> None:
     assert [round(float(v), 4) for v in (found.value, found.low, found.high)] == [
         0.2, 0.0524, 0.3339,
     ]  # fmt: skip
+
+
+def test_bounds_of_a_ratio_are_where_the_difference_has_a_bound_of_zero() -> None:
+    """The interval of a - r b, from those of a and b as in `difference`, ends at 0 (Zou 2008)."""
+    one, other = np.eye(8)[:, :4], np.tile([1, 1, 0, 1], (8, 1))
+    a, b, r = rate(one), rate(other), ratio(one, other)
+    assert r.value == pytest.approx(a.value / b.value)
+    low = np.hypot(a.value - a.low, r.low * (b.high - b.value))
+    high = np.hypot(a.high - a.value, r.high * (b.value - b.low))
+    assert a.value - r.low * b.value == pytest.approx(low)
+    assert r.high * b.value - a.value == pytest.approx(high)
 
 
 def test_runs_that_all_ended_alike_still_leave_doubt() -> None:

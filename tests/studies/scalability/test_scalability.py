@@ -112,12 +112,13 @@ def test_a_crossover_is_found_with_its_interval(table):
     assert "tree beats chain from" in report.analysis.paragraph
 
 
-def test_a_best_size_without_bound_is_said_in_words(tmp_path) -> None:
-    """Times fall as those of a serial fraction of 0.1, whose throughput has no maximum."""
+def report_of(serial: float):
+    """Return the report of times with a serial fraction, and with no failure."""
     columns = {str(n): {"scenario.robots": n} for n in (2, 4, 8, 16)}
     rng = np.random.default_rng(0)
     times = {
-        n: 200.0 * (0.1 + 0.9 / n) * rng.gamma(900.0, 1 / 900.0, (12, 1)) for n in (2, 4, 8, 16)
+        n: 200.0 * (serial + (1.0 - serial) / n) * rng.gamma(900.0, 1 / 900.0, (12, 1))
+        for n in (2, 4, 8, 16)
     }
     values = {
         c: {"steps": times[own["scenario.robots"]], "success": np.ones((12, 1))}
@@ -125,7 +126,12 @@ def test_a_best_size_without_bound_is_said_in_words(tmp_path) -> None:
     }
     of_seeds = {c: range(12) for c in columns}
     results = from_arrays({"evaluation": values}, of_seeds, {}, {}, columns, (SUCCESS,))
-    report = analyze(results, {}, None, None, None, None, "")
+    return analyze(results, {}, None, None, None, None, "")
+
+
+def test_a_best_size_without_bound_is_said_in_words() -> None:
+    """The throughput of a serial fraction has no maximum."""
+    report = report_of(0.1)
     assert "inf" not in str(report.laws)
     assert "more than 1" in report.analysis.paragraph
 
@@ -152,10 +158,20 @@ def test_the_table_has_all_forms(form, capsys):
     assert max(map(len, output.splitlines())) <= 80 or form != "table"
 
 
-def test_the_figure_shows_all_efficiencies_and_fills_points_on_the_front():
-    _, efficiency, _, front = draw(na.load(SCALING).scalability().analysis).axes
-    assert efficiency.get_ylim()[1] >= MAX_EFFICIENCY
-    assert [line.get_markerfacecolor() for line in front.lines] == ["#0072B2"]
+def test_the_figure_fills_the_points_on_the_front():
+    analysis = na.load(RESULTS / "controls.json").scalability().analysis
+    cost, largest = next(iter(analysis.data.costs)), analysis.data.all_sizes[-1]
+    on_front = [p.on_front for p in analysis.fronts if (p.cost, p.size) == (cost, largest)]
+    assert len({*on_front}) == 2
+    faces = [line.get_markerfacecolor() for line in draw(analysis).axes[3].lines]
+    assert [face != "white" for face in faces] == on_front
+
+
+def test_the_axis_of_efficiencies_reaches_above_one_even_if_all_are_low():
+    analysis = report_of(0.9).analysis
+    (own,) = analysis.speedups.values()
+    assert own[16.0].efficiency.value < 0.2
+    assert draw(analysis).axes[1].get_ylim()[1] >= MAX_EFFICIENCY
 
 
 def test_the_figure_is_written(tmp_path, capsys):

@@ -75,6 +75,12 @@ def test_a_plain_function_gets_all_situations_at_once_and_cannot_write_to_them()
     np.testing.assert_array_equal(whole.robots[2].gap, batch.gaps[2])
     np.testing.assert_allclose(whole.middle[1], batch.robots[:, 1].mean(axis=0), atol=1e-12)
     np.testing.assert_array_equal(whole.largest_gaps[0], batch.gaps.max(axis=0))
+    np.testing.assert_array_equal(whole.largest_gaps[1], np.sort(batch.gaps, axis=0)[1])
+    away = np.clip(batch.gaps / 0.03, 0.0, 1.0).sum(axis=0)
+    np.testing.assert_allclose(whole.n_away, away, atol=1e-12)
+    ahead = batch.goal[:2, None] - batch.boxes[:2]
+    np.testing.assert_allclose(whole.distance, np.hypot(*ahead), atol=1e-12)
+    np.testing.assert_allclose(whole.course, np.arctan2(ahead[1], ahead[0]), atol=1e-12)
     assert not any(
         each.flags.writeable
         for each in (*whole.box, *whole.origin, *whole.contact, whole.distance, *whole.robots[0])
