@@ -47,11 +47,14 @@ TEAMS = (
     ("64, leader by rule", 64, "leaders", "evaluation:64, rule", "default"),
     ("64, learned leader", 64, "leaders", "evaluation:64, learned", "default"),
     ("64, random leader", 64, "leaders", "evaluation:64, random", "default"),
+    ("128, no leader", 128, "leaders-128-none", "evaluation:128, no leader", "default"),
+    ("128, leader by rule", 128, "leaders-128", "evaluation:128, rule", "default"),
+    ("128, learned leader", 128, "leaders-128", "evaluation:128, learned", "default"),
     ("128, trained with 8", 128, "from-eight-128", "evaluation:128", "default"),
 )
 """A row's name, the number of robots, published results, and their phase and condition."""
 STEPS = 450
-"""Most decisions of an episode in those results."""
+"""Most decisions of an episode of the scripted controller."""
 
 
 @cache
@@ -99,7 +102,7 @@ def failures(name: str, phase: str, condition: str) -> str:
     results = na.load(RESULTS / f"{name}.json").results
     steps = results.values(condition, "steps", phase)
     failed = results.success(condition, phase) == 0
-    away = steps[failed & (steps < STEPS)]
+    away = steps[failed & (steps < results.step_limits.evaluation)]
     words = f"{failed.sum()} failures, {len(away)} with the box too far from the goal"
     if len(away):
         words += f" (after {median(away.tolist()):.0f} decisions in the median)"

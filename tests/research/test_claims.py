@@ -327,6 +327,8 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "rounds",
         "wide",
         "leaders",
+        "leaders-128",
+        "leaders-128-none",
         "peers-tuning",
         "peers-tuning-arm",
         "peers-tuning-arm-fuzzy",

@@ -40,6 +40,8 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("from-eight", ("evaluation success", "success, sixty-four")),
         ("wide", ("evaluation success", "success, sixty-four")),
         ("leaders", ("evaluation success", *(f"success, 64, {name}" for name in LEADERS))),
+        ("leaders-128", ("evaluation success", "success, 128, rule", "success, 128, learned")),
+        ("leaders-128-none", ("evaluation success", "success, 128, no leader")),
         ("large-team", LARGE_TEAM),
         ("own-value", ("evaluation success",)),
         ("transfer", ("evaluation success", "success, four", "success, eight")),
