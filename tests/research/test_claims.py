@@ -329,6 +329,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "leaders",
         "leaders-128",
         "leaders-128-none",
+        "leaders-256",
         "peers-tuning",
         "peers-tuning-arm",
         "peers-tuning-arm-fuzzy",

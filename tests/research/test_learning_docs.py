@@ -42,6 +42,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("leaders", ("evaluation success", *(f"success, 64, {name}" for name in LEADERS))),
         ("leaders-128", ("evaluation success", "success, 128, rule", "success, 128, learned")),
         ("leaders-128-none", ("evaluation success", "success, 128, no leader")),
+        ("leaders-256", ("evaluation success", "success, 256, rule")),
         ("large-team", LARGE_TEAM),
         ("own-value", ("evaluation success",)),
         ("transfer", ("evaluation success", "success, four", "success, eight")),
