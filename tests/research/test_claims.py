@@ -23,7 +23,7 @@ from programs import main
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.study import load_study
-from nested_agents.studies.results import published
+from nested_agents.studies.results import published, results_file
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.outline import StudyOutline
@@ -241,7 +241,7 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
 
 def test_results_of_another_version_are_told(tmp_path: Path, capsys, monkeypatch) -> None:
     old = RESULTS / "chain-order.json"
-    monkeypatch.setattr(published, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(results_file, "RESULTS_VERSION", 99)
     assert main(["table", str(old)]) == 0
     assert "chain-order.json: results of version 4, this is version 99" in capsys.readouterr().err
     shutil.copy(old, tmp_path)
