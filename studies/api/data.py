@@ -293,7 +293,7 @@ class StudyData:
         measure
             Measure of performance, which is predicted along with the time of the task and costs.
         size
-            The swept key that is the size; by default the only one of numbers.
+            The swept key that is the size; by default the number of robots or agents.
 
         Raises
         ------

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ...core.plugins.words import expect, expect_each
 from ..cost.profile import search_method
 from ..laws import scaling
-from ..laws.size_axis import SizeAxis, columns_of
+from ..laws.size_axis import SizeAxis
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.results import Results
@@ -73,7 +73,7 @@ def scaling_law(
     phase
         Of the episodes; by default ``evaluation``, or where there is none ``training``.
     size
-        The swept key, or its last part, as ``robots``; by default the only one of numbers.
+        The swept key, or its last part, as ``robots``; by default the number of robots or agents.
     criterion
         Fit the decisions of training until this share of five episodes in a row succeeds.
     predict
@@ -100,7 +100,7 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
     A team of each condition is built to find its method. A study with untrusted files, or one that
     is known by its table alone, has no methods.
     """
-    axis = SizeAxis.of(columns_of(results), size)
+    axis = SizeAxis.of(results, size)
     groups: dict[str, list[tuple[float, str]]] = {}
     for condition, settings in study.condition_settings().items():
         if condition in axis.places:

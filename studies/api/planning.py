@@ -118,7 +118,7 @@ class Plan:
     def _exponents(self) -> Iterator[str]:
         """Yield which differences of scaling exponents the study can detect, if it sweeps sizes."""
         with suppress(SpecError):
-            groups = SizeAxis.of(self.outline.columns).groups()
+            groups = SizeAxis.planned(self.outline.columns).groups()
             _, fewest = min((len(own), [*own.values()]) for own in groups.values())
             if len(fewest) >= FEWEST:
                 yield ""

@@ -20,7 +20,7 @@ from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, bootstrap
 from . import fitting
 from .samples import GEOMETRIC, of_numbers, of_rates, of_times
-from .size_axis import SizeAxis, check_size, columns_of
+from .size_axis import SizeAxis, check_size
 
 WINDOW = 5
 """Number of consecutive episodes over which mean success must reach a criterion."""
@@ -193,7 +193,7 @@ def scaling_law(
         If there is no such measure, phase or key, the key is no number, a size is below 1 or not
         finite, or the criterion is no share.
     """
-    axis = SizeAxis.of(columns_of(results), size)
+    axis = SizeAxis.of(results, size)
     for n in predict:
         check_size("predict", n)
     measured = (

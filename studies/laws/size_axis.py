@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,8 +24,8 @@ class SizeAxis(NamedTuple):
 
     Examples
     --------
-    >>> axis = SizeAxis.of({"2, chain": {"scenario.robots": 2, "topology": "chain"},
-    ...                     "4, chain": {"scenario.robots": "4", "topology": "chain"}})
+    >>> axis = SizeAxis.planned({"2, chain": {"scenario.robots": 2, "topology": "chain"},
+    ...                          "4, chain": {"scenario.robots": "4", "topology": "chain"}})
     >>> axis.name, axis.places["4, chain"]
     ('robots', ('chain', 4.0))
     """
@@ -47,8 +47,11 @@ class SizeAxis(NamedTuple):
         return groups
 
     @classmethod
-    def of(cls, columns: Columns, size: str | None = None) -> SizeAxis:
-        """Return the axis of a swept key, or of its last part; by default of the only number.
+    def of(cls, results: Results, size: str | None = None) -> SizeAxis:
+        """Return the axis of a swept key, or of its last part; by default of the team size.
+
+        The team size is the number of robots or agents that trials counted. Without counts it is
+        the only swept number that is no setting of learners or hierarchies.
 
         Raises
         ------
@@ -56,7 +59,13 @@ class SizeAxis(NamedTuple):
             If there is no such key, several keys are numbers, or a size is below 1 or above
             `MAX_SIZE`; one line.
         """
-        return cls.by(_size_key(columns, size), columns)
+        columns = columns_of(results)
+        return cls.by(_size_key(columns, size, _counts(results)), columns)
+
+    @classmethod
+    def planned(cls, columns: Columns) -> SizeAxis:
+        """Return the axis of a study before it runs; see `of`."""
+        return cls.by(_size_key(columns, None, []), columns)
 
     @classmethod
     def by(cls, key: str, columns: Columns) -> SizeAxis:
@@ -92,7 +101,17 @@ def check_size(name: str, size: float, where: str = "") -> None:
         raise SpecError(f"{name} = {shown}{where}: allowed are sizes from 1 to {MAX_SIZE:,}")
 
 
-def _size_key(columns: Columns, size: str | None) -> str:
+def _counts(results: Results) -> list[dict[str, float]]:
+    """Return the numbers of robots and of agents by condition, as far as trials counted them."""
+    numbers = {condition: results.numbers(condition) for condition in results.conditions}
+    return [
+        {condition: float(own[name][0]) for condition, own in numbers.items()}
+        for name in ("robots", "agents")
+        if numbers and all(name in own for own in numbers.values())
+    ]
+
+
+def _size_key(columns: Columns, size: str | None, counts: Sequence[Mapping[str, float]]) -> str:
     keys = dict.fromkeys(key for row in columns.values() for key in row)
     levels = {key: [row.get(key) for row in columns.values()] for key in keys}
     numbers = [k for k, own in levels.items() if all(map(_is_number, own)) and len({*own}) > 1]
@@ -101,10 +120,16 @@ def _size_key(columns: Columns, size: str | None) -> str:
         if key is None:
             raise SpecError(f"size = {size!r}: {closest(size, numbers)}; a swept key of numbers")
         return key
-    if len(numbers) != 1:
-        names = ", ".join(numbers) or "none"
+    counted = [
+        key
+        for key in numbers
+        if any(all(float(str(columns[c][key])) == n for c, n in own.items()) for own in counts)
+    ]
+    sizes = counted or [k for k in numbers if k.partition(".")[0] not in ("learner", "topology")]
+    if len(sizes) != 1:
+        names = ", ".join(sizes or numbers) or "none"
         raise SpecError(f"size: name the swept key that is the size; those of numbers: {names}")
-    return numbers[0]
+    return sizes[0]
 
 
 def _is_number(value: object) -> bool:

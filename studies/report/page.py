@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from ...core.plugins.words import show
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..laws.size_axis import columns_of
 from ..presentation.growth import growth_figures
 from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
@@ -33,7 +32,7 @@ from ..store.store import Store
 from ..workers.runner import installed
 from .pictures import hierarchy_pictures, pictures
 from .replays import replays
-from .sentences import SIZES, condition_sentences, main_title, methods, significant, verdict
+from .sentences import condition_sentences, main_title, methods, significant, verdict
 
 FOLDER = Path(__file__).parent
 CITATION = (
@@ -129,17 +128,13 @@ def _scalability_report(
     results: Results, settings: Mapping[str, SpecTable]
 ) -> ScalabilityReport | None:
     """Return the scalability report, or None if the study does not compare team sizes."""
-    keys = {key for columns in columns_of(results).values() for key in columns}
-    size = next((key for key in sorted(keys) if key.rpartition(".")[2] in SIZES), None)
-    if size is None:
-        return None
     validated = {}
     with suppress(ValueError, KeyError, ImportError):  # the scaling is unknown then
         for condition, own in settings.items():
             validated[condition] = ConditionSettings.model_validate(own)
     try:
-        return analyze(results, validated, None, size, None, None, "")
-    except SpecError:  # one size, or two conditions of a size
+        return analyze(results, validated, None, None, None, None, "")
+    except SpecError:  # no size, one size, or two conditions of a size
         return None
 
 

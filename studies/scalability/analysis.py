@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import permutations
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
+
+import numpy as np
 
 from ..laws.inference import sign_change
 from ..laws.universal import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
@@ -24,8 +26,13 @@ from .fronts import (
     probability_of_best,
 )
 
+T = TypeVar("T")
 LIKELY = 0.5
 """Probability above which a sentence names a best size or a member of a front."""
+MAX_NAMED = 4
+"""Most hierarchies that the paragraph describes one by one."""
+BEST_NAMED = 3
+"""Number of hierarchies that it describes if there are more: the best at the largest size."""
 
 
 class Crossover(NamedTuple):
@@ -34,6 +41,15 @@ class Crossover(NamedTuple):
     better: str
     worse: str
     size: Estimate
+
+
+class BestHierarchies(NamedTuple):
+    """The hierarchy, or the hierarchies, with the best mean performance at the largest size."""
+
+    size: float
+    hierarchies: tuple[str, ...]
+    probability: float
+    """Probability over seeds that one of them is the best of all measured at this size."""
 
 
 class BestSize(NamedTuple):
@@ -70,6 +86,29 @@ class Scalability:
             for name, own in times.items()
             if own is not None and len(own.sizes) >= MIN_SIZES
         }
+
+    @cached_property
+    def best(self) -> BestHierarchies | None:
+        """The best at the largest size; None without two hierarchies and two seeds there."""
+        size = self.data.all_sizes[-1]
+        names, (values,) = self.data.paired_at(size, [])
+        if len(names) < 2 or len(values) < 2:
+            return None
+        shares = probability_of_best(list(self.data.sign * values.T))
+        means = self.data.sign * values.mean(axis=0)
+        best = np.flatnonzero(means == means.max()).tolist()
+        return BestHierarchies(size, tuple(names[k] for k in best), float(shares[best].sum()))
+
+    @cached_property
+    def named(self) -> tuple[str, ...]:
+        """The hierarchies that the paragraph describes, see `MAX_NAMED`."""
+        data = self.data
+        if len(data.hierarchies) <= MAX_NAMED:
+            return data.hierarchies
+        size = data.all_sizes[-1]
+        means = {name: data.performances[name, size].mean() for name in data.at_size(size)}
+        ranked = sorted(means, key=lambda name: -data.sign * means[name])
+        return tuple(name for name in data.hierarchies if name in ranked[:BEST_NAMED])
 
     @cached_property
     def best_sizes(self) -> Mapping[str, BestSize]:
@@ -174,43 +213,69 @@ class Scalability:
             f"{title[0].upper()}{title[1:]} was measured with {sizes[0]:g} to {sizes[-1]:g} "
             f"{data.size}; the task {growth} ({data.scaling} scaling)."
         )
+        yield from self._best_sentences()
         yield from self._size_sentences()
         yield from self._crossover_sentences()
         yield from self._criterion_sentences()
         yield from self._front_sentences()
         yield from self._budget_sentences()
 
+    def _best_sentences(self) -> Iterator[str]:
+        """Yield which hierarchy is the best, and which hierarchies other sentences name."""
+        data = self.data
+        best = self.best
+        if best is not None:
+            names = best.hierarchies
+            mean = format_estimate(data.performance_estimates[names[0], best.size])
+            has = f"{names[0]} has" if len(names) == 1 else f"{len(names)} hierarchies share"
+            yield (
+                f"With {best.size:g} {data.size}, {has} the best mean of the "
+                f"{len(data.at_size(best.size))} measured, {mean}, with probability "
+                f"{format_number(best.probability)} over seeds."
+            )
+        if self.named != data.hierarchies:
+            yield (
+                f"The next sentences name the {len(self.named)} best hierarchies with "
+                f"{data.all_sizes[-1]:g} {data.size}; the tables have all."
+            )
+
     def _size_sentences(self) -> Iterator[str]:
         size = self.data.size
         efficiencies: dict[float, list[str]] = {}
-        for name, own in self.speedups.items():
+        for name, own in self._of_named(self.speedups):
             text = f"{format_estimate(own[max(own)].efficiency)} for {name}"
             efficiencies.setdefault(max(own), []).append(text)
         for largest, texts in efficiencies.items():
             yield f"With {largest:g} {size}, the efficiency is {_join(texts)}."
         places: dict[str, list[str]] = {}
-        for name, law in self.laws.items():
+        for name, law in self._of_named(self.laws):
             largest = self.data.sizes(name)[-1]
             places.setdefault(_place(law, largest, size), []).append(name)
         for place, names in places.items():
-            yield f"{_join(names)}: {place}."
+            yield f"For {_join(names)}, {place}."
         likely = [
             f"{best.size:g} for {name} (probability {format_number(best.probability)})"
-            for name, best in self.best_sizes.items()
+            for name, best in self._of_named(self.best_sizes)
             if best.probability > LIKELY
         ]
         if likely:
             yield f"Performance is best with this number of {size}: {_join(likely)}."
+
+    def _of_named(self, items: Mapping[str, T]) -> list[tuple[str, T]]:
+        return [(name, item) for name, item in items.items() if name in self.named]
 
     def _crossover_sentences(self) -> Iterator[str]:
         data = self.data
         if len(data.hierarchies) < 2:
             yield "There is one hierarchy, so that nothing can cross over."
             return
-        for better, worse, size in self.crossovers:
-            yield f"{better} beats {worse} from {format_estimate(size)} {data.size} on."
-        other = "other " if self.crossovers else ""
-        yield f"There is no {other}crossover up to {data.all_sizes[-1]:g} {data.size}."
+        known = [c for c in self.crossovers if c.better in self.named and c.worse in self.named]
+        for better, worse, size in known:
+            yield f"From {format_estimate(size)} {data.size} on, {better} beats {worse}."
+        other = "other " if known else ""
+        between = " between them" if self.named != data.hierarchies else ""
+        largest = f"{data.all_sizes[-1]:g} {data.size}"
+        yield f"There is no {other}crossover{between} up to {largest}."
 
     def _criterion_sentences(self) -> Iterator[str]:
         if self.data.has_criterion:
@@ -265,6 +330,7 @@ class Scalability:
             "performance": self.data.performance_title,
             "rows": [line._asdict() for line in self.summaries],
             "laws": {name: self._law_to_dict(name, law) for name, law in self.laws.items()},
+            "best": self.best._asdict() if self.best else None,
             "best_sizes": {name: own._asdict() for name, own in self.best_sizes.items()},
             "crossovers": [crossover._asdict() for crossover in self.crossovers],
             "fronts": [point._asdict() for point in self.fronts],

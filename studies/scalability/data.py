@@ -13,7 +13,7 @@ from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..laws.scaling import decisions_to_criterion
-from ..laws.size_axis import SizeAxis, columns_of
+from ..laws.size_axis import SizeAxis
 from ..laws.universal import Scaling, Times
 from ..results.analysis import estimate_of, mean_estimate
 from ..results.comparison import title_of, values_of
@@ -143,7 +143,7 @@ def collect(
     measure
         Name of the measure of performance.
     size
-        The swept key, or its last part; by default the only one of numbers.
+        The swept key, or its last part; by default the number of robots or agents.
     criterion
         Share of episodes in a row that must succeed for the cost `DECISIONS`, which is known where
         all seeds reach it; None: not measured.
@@ -153,7 +153,7 @@ def collect(
     SpecError
         If there is no such measure or size, or only one size; one line.
     """
-    axis = SizeAxis.of(columns_of(results), size)
+    axis = SizeAxis.of(results, size)
     places = {condition: (name or ALL_TEAMS, n) for condition, (name, n) in axis.places.items()}
     shown_as, values, phase = values_of(results, measure)
     performances = _cells(values, places)

@@ -107,7 +107,7 @@ def predict(
     measure
         Measure of performance.
     size
-        The swept key that is the size; by default the only one of numbers.
+        The swept key that is the size; by default the number of robots or agents.
     sizes
         Sizes to predict, none of which was run.
 
@@ -116,7 +116,7 @@ def predict(
     SpecError
         If a size was run, or nothing has a law; one line.
     """
-    axis = SizeAxis.of(columns_of(results), size)
+    axis = SizeAxis.of(results, size)
     run = {n for _, n in axis.places.values()}
     for n in sizes:
         check_size("predict", n)

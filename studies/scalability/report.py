@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, get_args
 
 from ..errors import SpecError
-from ..laws.size_axis import SizeAxis, columns_of
+from ..laws.size_axis import SizeAxis
 from ..laws.universal import Scaling
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
@@ -104,7 +104,7 @@ def _scaling_of(
     results: Results, settings: Mapping[str, ConditionSettings], size: str | None
 ) -> Scaling | None:
     """Return whether the task grows with the team; None if the scenario does not say."""
-    places = SizeAxis.of(columns_of(results), size).places
+    places = SizeAxis.of(results, size).places
     sizes: dict[float, set[float | None]] = {}
     for condition, own in settings.items():
         if condition in places:

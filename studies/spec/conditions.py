@@ -203,7 +203,7 @@ class Condition(NamedTuple):
     """Short name, unique within its study."""
     columns: SpecTable
     """Columns that distinguish it in results: `name` if there are overrides, the swept keys (empty
-    where an override does not sweep), `preset` if there is neither."""
+    where an override neither sweeps nor sets them), `preset` if there is neither."""
     settings: ConditionSettings
     """The resolved settings."""
     evaluations: tuple[tuple[str, ConditionSettings], ...] = ()

@@ -166,7 +166,9 @@ def _condition(
         for other, changes in spec.evaluations.items()
     ]
     columns: Point = {"name": table.name} if table else {}
-    columns |= {key: column_value(point[key]) if key in point else "" for key in keys}
+    own = flat(sections_of(table) if table else {})
+    values = {**{key: value for key, value in own if value != {}}, **point}
+    columns |= {key: column_value(values[key]) if key in values else "" for key in keys}
     columns = columns or {"preset": spec.preset}
     return Condition(name, columns, settings, tuple(evaluations), tuple(stages))
 

@@ -16,7 +16,7 @@ from ..loading import read_results, say_remarks
 @click.option(
     "--size",
     metavar="KEY",
-    help="The swept key that is the size, as robots; by default the only one of numbers.",
+    help="The swept key that is the size; by default the number of robots or agents.",
 )
 @click.option(
     "--criterion",

@@ -25,7 +25,7 @@ READING = {"sources", "columns", "where", "trust"}
 @click.option(
     "--size",
     metavar="KEY",
-    help="The swept key that is the size, as robots; by default the only one of numbers.",
+    help="The swept key that is the size; by default the number of robots or agents.",
 )
 @click.option(
     "--scaling",

@@ -109,7 +109,36 @@ def test_a_crossover_is_found_with_its_interval(table):
     (crossover,) = report.analysis.crossovers
     assert (crossover.better, crossover.worse) == ("tree", "chain")
     assert 4.0 <= crossover.size.low < crossover.size.value < crossover.size.high <= 8.0
-    assert "tree beats chain from" in report.analysis.paragraph
+    assert "agents on, tree beats chain." in report.analysis.paragraph
+
+
+def test_the_size_is_what_changes_the_team_and_no_setting_of_the_learner():
+    """A swept budget was taken for the size, because the single agent has no swept size."""
+    analysis = na.load(RESULTS / "equal-computing-boxes.json").scalability().analysis
+    assert analysis.data.size == "robots"
+    assert analysis.data.all_sizes == (2.0, 4.0, 8.0)
+    assert analysis.data.sizes("single agent, budget=64") == (2.0,)
+
+
+def test_the_best_hierarchy_at_the_largest_size_comes_first():
+    analysis = na.load(RESULTS / "equal-computing-boxes.json").scalability().analysis
+    best = analysis.best
+    assert best.hierarchies == ("hierarchy, topology=chain, budget=1024",)
+    assert best.size == 8.0
+    assert best.probability > 0.95
+    assert best.hierarchies[0] in analysis.sentences[1]
+    assert len(analysis.named) == 3
+
+
+def test_a_swept_setting_is_no_size():
+    columns = {str(n): {"learner.decision.budget": n} for n in (64, 256, 1024)}
+    values = {c: {"steps": np.ones((4, 1)), "success": np.ones((4, 1))} for c in columns}
+    of_seeds = {c: range(4) for c in columns}
+    results = from_arrays({"evaluation": values}, of_seeds, {}, {}, columns, (SUCCESS,))
+    with pytest.raises(
+        na.SpecError, match=r"^size: name the .*: learner.decision.budget"
+    ):
+        analyze(results, {}, None, None, None, None, "")
 
 
 def report_of(serial: float):
