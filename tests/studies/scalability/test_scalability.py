@@ -135,9 +135,7 @@ def test_a_swept_setting_is_no_size():
     values = {c: {"steps": np.ones((4, 1)), "success": np.ones((4, 1))} for c in columns}
     of_seeds = {c: range(4) for c in columns}
     results = from_arrays({"evaluation": values}, of_seeds, {}, {}, columns, (SUCCESS,))
-    with pytest.raises(
-        na.SpecError, match=r"^size: name the .*: learner.decision.budget"
-    ):
+    with pytest.raises(na.SpecError, match=r"^size: name the .*: learner.decision.budget"):
         analyze(results, {}, None, None, None, None, "")
 
 
