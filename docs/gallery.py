@@ -19,6 +19,13 @@ PIXELS = 320
 """Longest side of a picture."""
 CLIMBING = np.array([[11, -30, 0], [-30, 7, 6], [0, 0, 5]])
 """Payoffs of the climbing game (Claus and Boutilier 1998)."""
+PLAIN = {
+    "xtick.labelbottom": False,
+    "ytick.labelleft": False,
+    "axes.labelcolor": "none",
+    "axes.titlecolor": "none",
+}
+"""Style without labels, which are too small to read in a small picture."""
 SCENARIOS = {
     "box-pushing": na.BoxPushingSettings(robots=2),
     "box-shapes": na.BoxPushingSettings(robots=4, box="L"),
@@ -39,7 +46,8 @@ def first_frame(scenario: na.Scenario, path: Path) -> Image.Image:
     state = scenario.measure()
     recording = {name: np.stack([np.asarray(state[name])] * 2) for name in scenario.recorded}
     constants = {k: np.asarray(value) for k, value in scenario.constants_of_episode().items()}
-    scenario.animate(recording | constants, path)
+    with mpl.rc_context(PLAIN):
+        scenario.animate(recording | constants, path)
     return Image.open(path)
 
 
