@@ -332,3 +332,9 @@ def test_a_center_of_mass_outside_is_refused() -> None:
     assert "\n" not in str(caught.value)
     hollow = BoxSpec("L", L_SHAPE, center_of_mass=(0.12, 0.12))  # between the arms of the L
     assert hollow.reach > 0.15
+
+
+def test_the_drawn_outline_of_a_disc_is_a_closed_circle() -> None:
+    (ring,) = BOXES["circle"].rings
+    np.testing.assert_allclose(np.hypot(*ring.T), BOXES["circle"].radius)
+    np.testing.assert_allclose(ring[0], ring[-1], atol=1e-15)

@@ -48,6 +48,12 @@ def test_inside_a_hole_is_outside_the_material() -> None:
     np.testing.assert_allclose(distances(*points.T.copy(), PLATE), [0.03, -0.01, 0.02])
 
 
+@pytest.mark.parametrize("count", [1, LANES, LANES + 1, 2 * LANES + 1])
+def test_the_last_block_of_points_may_be_incomplete(count: int) -> None:
+    x = np.linspace(0.15, 0.3, count)
+    np.testing.assert_allclose(distances(x, np.zeros(count), SQUARE), x - 0.1, atol=1e-13)
+
+
 def test_rays() -> None:
     assert ray(SQUARE, -0.15, 0.0, 1.0, 0.0, 1.0) == pytest.approx(0.05)
     assert ray(SQUARE, -0.15, 0.0, -1.0, 0.0, 1.0) == 1.0
