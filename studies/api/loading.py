@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -273,11 +274,12 @@ def _of_scores(
 
 def _check_distinct(paths: Sequence[Path]) -> None:
     """Refuse paths of which two are the same place."""
-    known = set[Path]()
+    known = set[str]()
     for path in paths:
-        if path.resolve() in known:
+        place = os.path.realpath(path)
+        if place in known:
             raise SpecError(f"{path}: is named more than once")
-        known.add(path.resolve())
+        known.add(place)
 
 
 def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResults:

@@ -37,6 +37,8 @@ class Fitted(NamedTuple):
     """Reason why there is no law, in one sentence."""
     censored: int = 0
     """Number of runs that did not reach the criterion."""
+    left_out: int = 0
+    """Number of runs of seeds that lack another size."""
 
 
 class ScalingLaw(NamedTuple):
@@ -148,8 +150,11 @@ def _sentence(fitted: Fitted, size: str) -> str:
         return f"{head}no law: {fitted.why}"
     sizes = law.sample.sizes
     counted = f"{law.seeds} seeds, {len(sizes)} sizes from {sizes[0]:g} to {sizes[-1]:g} {size}"
-    unreached = f", {fitted.censored} runs censored" if fitted.censored else ""
-    text = f"{head}{law.curve.name}, {law.formula} ({counted}{unreached})"
+    if fitted.censored:
+        counted += f", {fitted.censored} runs censored"
+    if fitted.left_out:
+        counted += f"; {fitted.left_out} runs left out, whose seeds lack another size"
+    text = f"{head}{law.curve.name}, {law.formula} ({counted})"
     for n, measured, e in law.held_out:
         inside = "inside" if e.low <= measured <= e.high else "outside"
         text += f"; {n:g} left out: predicted {format_estimate(e)}, "
@@ -280,8 +285,10 @@ def _fit(group: str, sizes_of: Mapping[str, float], measured: SizedValues) -> Fi
     sizes = np.array(list(sizes_of.values()))
     if not (np.diff(sizes) > 0.0).all():
         return Fitted(group, None, "a size occurs twice; conditions differ in something else")
-    frame = pd.DataFrame({c: measured.values[c] for c in sizes_of}).dropna()
+    every = pd.DataFrame({c: measured.values[c] for c in sizes_of})
+    frame = every.dropna()
     values = frame.to_numpy(dtype=float)
+    left_out = int(every.count().sum()) - values.size
     censored = np.zeros(values.shape, dtype=bool)
     if measured.censored:
         marks = pd.DataFrame({c: measured.censored[c] for c in sizes_of})
@@ -296,7 +303,8 @@ def _fit(group: str, sizes_of: Mapping[str, float], measured: SizedValues) -> Fi
             sample = of_times(sizes, values, censored)
         else:
             sample = of_numbers(sizes, values, measured.bounds)
-        return Fitted(group, fitting.choose(sample), censored=int(censored.sum()))
+        law = fitting.choose(sample)
+        return Fitted(group, law, censored=int(censored.sum()), left_out=left_out)
     except ValueError as error:
         is_pair = values.shape[1] == 2 and len(values) > 1 and not censored.any()
         if not is_pair:

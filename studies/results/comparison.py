@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..spec.tables import aliases, label, named
 from .analysis import NOTHING, Summary, identity_lines, mean_estimate, verdicts
 from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
-from .notation import wrapped
+from .notation import MIN_LARGEST, wrapped
 from .power_text import power_lines
 from .recovery import RECOVERY, recovery_by_seed
 from .results import SECONDS, STEPS, Results, describe_number, row_means
@@ -318,6 +318,12 @@ def values_by_seed(
         known = {c: own for c, own in of_phase.items() if own.size}
         if not known:
             raise SpecError(f"measure = {name!r}: no condition has it in the phase {phase!r}")
+        largest = max(float(own.abs().max(axis=None)) for own in known.values())
+        if 0.0 < largest < MIN_LARGEST:
+            raise SpecError(
+                f"measure = {name!r}: the largest value is {largest:.3g}, allowed: at least "
+                f"{MIN_LARGEST:g}, or 0; use a smaller unit"
+            )
         return measure, known, phase
     return _trial_numbers(results, name, {*measures, *recovery})
 

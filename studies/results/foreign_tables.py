@@ -23,6 +23,7 @@ from .scores import (
     UNNAMED,
     Better,
     ScoreResults,
+    alike_note,
     at_last_step,
     joined_notes,
     measure_of,
@@ -166,6 +167,10 @@ def read_scores(
     scores = values[has_score].reset_index(drop=True).assign(condition=_labels(levels))
     conditions = _conditions(scores["condition"], levels)
     scores = _named(table, columns, scores)
+    for name in levels:
+        notes += alike_note(str(name), levels[name])
+    for name in filter(None, (columns.seed, columns.item)):
+        notes += alike_note(name, table.text(name), are_runs=True)
     has_items = columns.seed is not None and columns.item is not None
     if columns.seed is None:
         one_value = f"no column 'seed': a seed below is one value of {columns.item!r}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, TypeAlias
 
@@ -12,6 +11,7 @@ from pydantic import PlainValidator, ValidationError
 
 from ...core.plugins.problems import dotted, place, rule
 from ...core.plugins.words import show
+from ..trials.episodes import MAX_NUMBER
 
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | float | bool | None"
 """Content of a JSON file."""
@@ -74,13 +74,13 @@ def _finite(value: object) -> float:
     """Return a finite number; whole numbers stay integers."""
     if type(value) is int and abs(value) <= MAX_WHOLE:
         return value
-    if type(value) is float and math.isfinite(value):
+    if type(value) is float and abs(value) <= MAX_NUMBER:
         return value
-    raise ValueError("must be a finite number")
+    raise ValueError("must be a finite number, at most 1e100, or 2**53 if it is whole")
 
 
 Finite = Annotated[float, PlainValidator(_finite)]
-"""A finite number; text, truth values and whole numbers above `MAX_WHOLE` are refused."""
+"""A number up to `MAX_NUMBER`, or `MAX_WHOLE` if whole; text and truth values are refused."""
 
 
 def explain(error: ValidationError, file: Json) -> str:
@@ -94,7 +94,7 @@ def explain(error: ValidationError, file: Json) -> str:
     ...     TypeAdapter(dict[str, list[Finite]]).validate_python(file)
     ... except ValidationError as error:
     ...     print(explain(error, file))
-    steps[1] = '6': must be a finite number
+    steps[1] = '6': must be a finite number, at most 1e100, or 2**53 if it is whole
     """
     first, *others = error.errors(include_url=False)
     keys = place(first["loc"], file)

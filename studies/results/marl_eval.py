@@ -139,7 +139,8 @@ def _is_ignored(key: str) -> bool:
 
 Metrics = dict[str, Annotated[list[Finite], BeforeValidator(_as_list)]]
 RunTable = Annotated[dict[str, Metrics], BeforeValidator(_without_others)]
-Algorithms = dict[str, Annotated[dict[str, RunTable], Field(min_length=1)]]
+Name = Annotated[str, Field(pattern=r"\S")]
+Algorithms = dict[Name, Annotated[dict[Name, RunTable], Field(min_length=1)]]
 FILE = TypeAdapter(dict[str, dict[str, Algorithms]])
 RUN = ["task", "algorithm", "seed"]
 """Columns that name a run."""
@@ -206,9 +207,10 @@ def _rows(run: Mapping[str, Metrics], path: str) -> Iterator[tuple[str, float, l
         if (first := keys.setdefault(match[1] if match else ABSOLUTE, key)) != key:
             raise ValueError(f"{path}.{key}: is {first}, too")
         step = _step_count(metrics, f"{path}.{key}") if match else FINAL
-        for metric, values in metrics.items():
-            if metric == STEP_COUNT or not values:
+        for name, values in metrics.items():
+            if name == STEP_COUNT or not values:
                 continue
+            metric = f"{name} (own)" if name in KEYS else name
             if (metric, step) in known:
                 raise ValueError(
                     f"{path}.{key}.{STEP_COUNT} = {step}: another step of the run has it"

@@ -13,7 +13,12 @@ from .statistics import Estimate
 
 MAX_DECIMALS = 2
 MIN_SCIENTIFIC = 1e6
-"""Smallest magnitude that is shown with a power of ten."""
+"""Magnitude from which on a number is shown with a power of ten."""
+SMALL, NEGLIGIBLE = 0.005, 1e-7
+"""Magnitudes between which a number, or the largest part of an estimate, has a power of ten, too:
+two decimals would show none of its digits."""
+MIN_LARGEST = 1e-6
+"""Smallest magnitude of the largest value of a measure. What is below may be a rounding error."""
 SIGNIFICANT, EXACT_DECIMALS = 12, 9
 """Digits that are not rounding errors: values that differ beyond them are shown alike."""
 
@@ -21,7 +26,7 @@ SIGNIFICANT, EXACT_DECIMALS = 12, 9
 def format_number(value: float, *, signed: bool = False) -> str:
     """Return a number in two significant figures, but all digits before the decimal point.
 
-    It has at most two decimals, and a power of ten from a million on.
+    It has at most two decimals, and a power of ten from a million on and below 0.005.
 
     Parameters
     ----------
@@ -33,7 +38,7 @@ def format_number(value: float, *, signed: bool = False) -> str:
     Examples
     --------
     >>> [format_number(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 340, 2.7e11)]
-    ['0.98', '1.00', '-0.03', '0', '12', '340', '2.7e11']
+    ['0.98', '1.00', '-0.03', '2.1e-3', '12', '340', '2.7e11']
     >>> format_number(0.5, signed=True), format_number(12345.0)
     ('+0.50', '12345')
     """
@@ -74,12 +79,14 @@ def format_p(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"= {p:.{3 if p < 0.1 else 2}f}"
 
 
-def _decimals(value: float, low: float = math.nan, high: float = math.nan) -> int:
+def _decimals(value: float, low: float = math.nan, high: float = math.nan) -> int | None:
     """Return how many decimals give a value and the width of its interval two figures, at most 2.
 
-    None if all are whole.
+    They are 0 if all are whole, and None if all have a power of ten because they are small.
     """
     known = [part for part in (value, low, high) if math.isfinite(part)]
+    if NEGLIGIBLE <= max(map(abs, known), default=0.0) < SMALL:
+        return None
     if all(part == int(part) for part in known):
         return 0
     sizes = [size for size in (abs(value), high - low) if math.isfinite(size) and size > 0.0]
@@ -87,17 +94,21 @@ def _decimals(value: float, low: float = math.nan, high: float = math.nan) -> in
     return min(MAX_DECIMALS, max(0, 1 - math.floor(math.log10(smallest))))
 
 
-def _fixed(value: float, decimals: int, rounding: str = ROUND_HALF_UP, *, signed: bool) -> str:
+def _fixed(
+    value: float, decimals: int | None, rounding: str = ROUND_HALF_UP, *, signed: bool
+) -> str:
     """Return a number with so many decimals, or with a power of ten; zero has neither."""
     if not math.isfinite(value):
         return "?" if math.isnan(value) else f"{value:+}" if signed else f"{value}"
     exact = Decimal(f"{round(value, EXACT_DECIMALS):.{SIGNIFICANT}g}")
-    places = 1 - exact.adjusted() if abs(value) >= MIN_SCIENTIFIC else decimals
+    if abs(value) >= MIN_SCIENTIFIC:
+        decimals = None
+    places = 1 - exact.adjusted() if decimals is None else decimals
     rounded = exact.quantize(Decimal(1).scaleb(-places), rounding)
     if rounded == 0:
         return "0"
     sign = "+" if signed else "-"
-    if abs(value) < MIN_SCIENTIFIC:
+    if decimals is not None:
         return f"{rounded:{sign}f}"
     mantissa, power = f"{rounded:{sign}.1e}".split("e")
     return f"{mantissa}e{int(power)}"

@@ -20,6 +20,7 @@ from ...core.numerics import IntArray, pd
 from ...core.plugins.words import show
 from ..errors import SpecError, refused
 from ..store.durable import check_file, read_text
+from ..trials.episodes import MAX_NUMBER
 from .json_files import Json, read_json
 
 SUFFIXES = (".csv", ".jsonl", ".parquet")
@@ -30,8 +31,6 @@ TRUTHS = {"true": 1.0, "false": 0.0}
 """Scores that are truth values."""
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 """Separators of fields that are not supported."""
-MAX_SCORE = 1e100
-"""Largest size of a score, so that no variance overflows."""
 
 
 class JsonNumber(str):
@@ -85,6 +84,8 @@ class ScoreTable(NamedTuple):
         cells = self.frame[column]
         texts = cells.map(cell_text)
         self.refuse(texts.isna(), column, ": must be text or a number")
+        exact = ": is a rounded number; whole numbers of this size must be integers or text"
+        self.refuse(cells.map(_is_rounded), column, exact)
         is_text = cells.map(lambda cell: isinstance(cell, str) and not isinstance(cell, JsonNumber))
         is_other = is_text != is_text.groupby(texts).transform("first")
         other = ": must be text everywhere or a number everywhere"
@@ -107,7 +108,7 @@ class ScoreTable(NamedTuple):
         """
         values = self.frame[column].map(score_value).astype(float)
         finite = ": must be a finite number with a decimal point, at most 1e100, or blank"
-        self.refuse(values.abs() > MAX_SCORE, column, finite)
+        self.refuse(values.abs() > MAX_NUMBER, column, finite)
         if not values.dropna().isin((0.0, 1.0)).all():
             truths = self.frame[column].map(cell_text).str.strip().str.lower().isin(TRUTHS)
             self.refuse(truths, column, ": must be a number, as other scores are")
@@ -119,6 +120,11 @@ def is_blank(cell: object) -> bool:
     if isinstance(cell, str):
         return not cell.strip()
     return cell is None or (pd.api.types.is_scalar(cell) and bool(pd.isna(cell)))
+
+
+def _is_rounded(cell: object) -> bool:
+    """Return whether a cell is a float of a size at which floats skip whole numbers."""
+    return isinstance(cell, float | np.floating) and bool(np.spacing(np.abs(cell)) > 1.0)
 
 
 def cell_text(cell: object) -> str | None:
@@ -169,7 +175,10 @@ def read_table(path: Path) -> ScoreTable:
             return _read_json_lines(read_text(path))
         if path.suffix == ".parquet":
             check_file(path)
-            frame = pd.read_parquet(path, engine="pyarrow", page_checksum_verification=True)
+            exact = {"dtype_backend": "pyarrow"}  # whole numbers beside blank cells stay whole
+            frame = pd.read_parquet(
+                path, engine="pyarrow", page_checksum_verification=True, **exact
+            )
             return table_of(frame)
         return _records_table(read_json(read_text(path), JsonNumber))
     except ImportError:

@@ -7,8 +7,10 @@ column for each measure. Runs and items are paired by name.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from decimal import Decimal
 from typing import Literal, NamedTuple
 
 from ...core.interface.measures import SUCCESS, Measure
@@ -84,6 +86,27 @@ def plain_levels(levels: pd.Series) -> pd.Series:
     }
     are_plain = all(str(numbers.get(text)) == text for text in levels.unique())
     return levels.map(numbers) if are_plain else levels
+
+
+def alike_note(column: str, names: pd.Series, *, are_runs: bool = False) -> list[str]:
+    """Return a note on the first two names of a column that a reader takes for the same, if any.
+
+    They differ in white space, in the encoding of a character or, for runs, in the spelling of a
+    number.
+
+    >>> alike_note("seed", pd.Series(["7", "07"]), are_runs=True)
+    ["seed: '7' and '07' look alike, but are different names"]
+    """
+    known: dict[object, str] = {}
+    for name in names.unique():
+        key: object = unicodedata.normalize("NFKC", name).strip()
+        if are_runs and NUMBER.fullmatch(str(key)):
+            key = Decimal(str(key))
+        first = known.setdefault(key, name)
+        if first != name:
+            pair = f"{first!a} and {name!a}"
+            return [f"{column}: {pair} look alike, but are different names"]
+    return []
 
 
 def refuse_repeated(

@@ -6,7 +6,7 @@ Scenarios declare the measures, see `nested_agents.core.interface.measures`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import inf, isfinite
+from math import inf
 from operator import add
 from typing import NamedTuple
 
@@ -17,6 +17,8 @@ from ...core.interface.scenario import Transition
 from ..errors import SpecError
 from ..store.database import AFTER, BEFORE
 
+MAX_NUMBER = 1e100
+"""Largest magnitude of a measured number, so that no variance overflows."""
 NO_COSTS: Mapping[str, float] = {}
 """Costs of a decision of agents that report none."""
 
@@ -99,14 +101,14 @@ class EpisodeMeter:
         Raises
         ------
         FloatingPointError
-            If a measurement is not finite.
+            If a measurement is not finite, or larger than `MAX_NUMBER`.
         """
         means = [m.name for m in self._measures if m.gathering == "mean"]
         measured = self._values | {name: self._values[name] / self._steps for name in means}
         for name, value in {**measured, "return": self._return}.items():
-            if not isfinite(value):
+            if not abs(value) <= MAX_NUMBER:
                 where = f"{self._phase} episode {self._episode}"
-                raise FloatingPointError(f"{name} = {value} in {where}")
+                raise FloatingPointError(f"{name} = {value} in {where}, allowed: at most 1e100")
         measured |= {m.name: bool(measured[m.name]) for m in self._measures if m.is_rate}
         return EpisodeRow(self._phase, self._episode, self._steps, measured, self._return)
 

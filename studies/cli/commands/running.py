@@ -1,5 +1,6 @@
 """Commands that run trials: ``demo``, ``run``, ``tune``, ``plan`` and ``retry``."""
 
+import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -98,7 +99,8 @@ def run(
     try:
         changed = Spec.load(spec, changes, study=out)
     except SpecError as error:
-        if not (out / DATABASE).exists() or spec.resolve() != (out / SPEC_FILE).resolve():
+        own = os.path.realpath(out / SPEC_FILE)
+        if not (out / DATABASE).exists() or os.path.realpath(spec) != own:
             raise
         raise SpecError(
             f"{error}; if you did not edit {spec}, it is damaged: {command_line('retry', out)} "

@@ -4,6 +4,7 @@ import os
 import shutil
 import sqlite3
 from contextlib import closing
+from pathlib import Path
 
 import made_up
 import pytest
@@ -148,3 +149,13 @@ def test_a_reader_that_goes_away_is_told_by_the_status(study, command) -> None:
     os.close(writing)
     status, _, err = finish(process)
     assert (status, err) == (141, "")
+
+
+@pytest.mark.parametrize("command", ["compare", "table", "status"])
+def test_a_link_to_itself_is_one_line(command: str, tmp_path: Path, capsys) -> None:
+    loop = tmp_path / "loop.csv"
+    loop.symlink_to(loop)
+    assert main([command, str(loop)]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert "loop.csv" in err

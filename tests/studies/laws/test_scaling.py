@@ -232,6 +232,11 @@ def test_a_table_of_scores_is_fitted(tmp_path, capsys) -> None:
     out = " ".join(capsys.readouterr().out.split())
     assert "power law, mean = 3 n^1.5 (4 seeds, 4 sizes from 1 to 8 agents)" in out
     assert "192 [" in out
+    short = tmp_path / "short.csv"
+    short.write_text("\n".join((tmp_path / "scores.csv").read_text().splitlines()[:-1]))
+    assert main(["fit", str(short), "--columns", "condition=agents"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "(3 seeds, 4 sizes from 1 to 8 agents; 3 runs left out" in out
     labeled = tmp_path / "labels.csv"
     labeled.write_text((tmp_path / "scores.csv").read_text().replace("agents", "condition"))
     assert main(["fit", str(labeled)]) == 0

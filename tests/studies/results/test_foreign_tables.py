@@ -280,3 +280,44 @@ def test_a_choice_of_trials_runs_no_code(tmp_path, capsys) -> None:
         assert main(["compare", str(tmp_path / "scores.csv"), "--where", choice]) == 2
         assert "where = " in capsys.readouterr().err
     assert not made.exists()
+
+
+@pytest.mark.parametrize(
+    ("column", "names"),
+    [
+        ("condition", ("a", "a ")),
+        ("condition", ("\u00e9", "e\u0301")),
+        ("seed", ("1", "1.0")),
+        ("seed", ("7", "07")),
+    ],
+)
+def test_names_that_look_alike_stay_apart_and_are_told(column: str, names: tuple[str, str]) -> None:
+    labels = names if column == "condition" else ("a", "b")
+    firsts = names if column == "seed" else ("1", "1")
+    rows = [
+        (label, seed, k + 0.1 * len(seed))
+        for k, (label, first) in enumerate(zip(labels, firsts, strict=True))
+        for seed in (first, "21", "22", "23")
+    ]
+    table = pd.DataFrame(rows, columns=["condition", "seed", "score"])
+    results, notes, _ = read(table, ScoreColumns())
+    assert {*results.conditions} == {*labels}
+    assert len({seed for label in labels for seed in results.seeds(label)}) == len({*firsts}) + 3
+    told = [note for note in notes if "look alike" in note]
+    assert [note.startswith(f"{column}: {names[0]!a} and {names[1]!a}") for note in told] == [True]
+
+
+def test_small_scores_are_shown_and_tiny_ones_refused(tmp_path: Path, capsys) -> None:
+    path = tmp_path / "scores.csv"
+
+    def compare(unit: float) -> int:
+        rows = [f"{c},{s},{(s + 5 * k + 1) * unit!r}" for k, c in enumerate("ab") for s in range(8)]
+        path.write_text("\n".join(["condition,seed,score", *rows]))
+        return main(["compare", str(path)])
+
+    assert compare(1e-5) == 0
+    out = capsys.readouterr().out
+    assert "4.5e-5 [" in out
+    assert "b, +5.0e-5 [+5.0e-5, +5.0e-5]" in out
+    assert compare(1e-9) == 2
+    assert "measure = 'score': the largest value is 1.3e-08" in capsys.readouterr().err

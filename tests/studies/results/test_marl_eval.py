@@ -107,6 +107,16 @@ def test_runs_are_paired_by_name(tmp_path: Path) -> None:
     assert "B, 1 of 19 runs" in " ".join(comparison.notes)
 
 
+@pytest.mark.parametrize("name", ["condition", "phase", "seed", "episode"])
+def test_metrics_may_be_named_as_columns_of_results(name: str, tmp_path: Path) -> None:
+    runs = {
+        algorithm: {f"seed_{k}": {"absolute_metrics": {name: [k + shift]}} for k in range(4)}
+        for algorithm, shift in (("A", 0.0), ("B", 0.5))
+    }
+    (found,) = compare(tmp_path, runs, measure=f"{name} (own)").differences
+    assert found.sample.tolist() == [0.5] * 4
+
+
 def test_a_run_that_was_killed_is_left_out_and_counted(tmp_path: Path) -> None:
     short = {"step_1": SERIES["step_1"]}
     runs = {
@@ -199,7 +209,9 @@ RUN = ("vmas", "balance", "ippo", "seed_1")
         ((*RUN, "step_1", "step_count"), 60, "seed_1.step_1.step_count = 60"),
         ((*RUN, "absolute_metrics", "return"), [10**30], "absolute_metrics.return[0] = 1000"),
         ((*RUN, "absolute_metrics"), [1.0], "seed_1.absolute_metrics = [1.0]"),
+        ((*RUN, "step_1", "return"), [1e101], "seed_1.step_1.return[0] = 1e+101"),
         (RUN, 3, "ippo.seed_1 = 3: must be a table"),
+        ((*RUN[:3], " "), {}, "vmas.balance.ippo. = ' '"),
         (RUN[:3], {}, "vmas.balance.ippo = {}"),
         (RUN[:2], ["ippo"], "vmas.balance = ['ippo']"),
     ],

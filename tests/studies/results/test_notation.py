@@ -27,6 +27,8 @@ from nested_agents.studies.results.statistics import Estimate
         ((1.2, 0.5, math.inf), "1.2 [0.5, inf]"),
         ((0.5, math.nan, math.nan), "0.50"),
         ((0.0, -7e-16, 7e-16), "0 [0, 0]"),
+        ((3.5e-4, -1.31e-4, 8.31e-4), "3.5e-4 [-1.4e-4, 8.4e-4]"),
+        ((2.1e-3, 0.0, 4.9e-3), "2.1e-3 [0, 4.9e-3]"),
     ],
 )
 def test_estimates_by_hand(estimate, shown):
@@ -71,6 +73,6 @@ rates = st.floats(0.0, 1.0)
 @given(st.tuples(rates, rates, rates).map(sorted))
 def test_rates_shown_are_rates(parts):
     low, value, high = parts
-    shown = re.findall(r"[-\d.]+", format_estimate(Estimate(value, low, high)))
+    shown = re.findall(r"[-\d.e]+", format_estimate(Estimate(value, low, high)))
     assert all(0.0 <= float(text) <= 1.0 for text in shown)
     assert not any(text.startswith((".", "-")) for text in shown)

@@ -3,10 +3,11 @@
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.results.score_tables import read_table
+from nested_agents.studies.results.score_tables import read_table, table_of
 
 NAMES = [
     "3.1",
@@ -75,3 +76,22 @@ def test_malformed_files_are_refused_with_their_line(
         read_table(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+def test_whole_numbers_beside_blank_cells_of_parquet_stay_whole(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow", reason="extra [parquet]")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    path = tmp_path / "names.parquet"
+    seeds = pyarrow.array([2**60, 2**60 + 1, None], pyarrow.int64())
+    names = pyarrow.array(["3.10", "0012", None]).dictionary_encode()
+    parquet.write_table(pyarrow.table({"seed": seeds, "name": names}), path)
+    table = read_table(path)
+    assert table.text("seed").tolist() == [str(2**60), str(2**60 + 1), ""]
+    assert table.text("name").tolist() == ["3.10", "0012", ""]
+
+
+def test_names_that_pandas_has_rounded_are_refused() -> None:
+    table = table_of(pd.DataFrame({"seed": [2**60, 2**60 + 1, None], "few": [7, None, 8]}))
+    with pytest.raises(SpecError, match=r"row 0: seed = 1\.15.*: is a rounded number"):
+        table.text("seed")
+    assert table.text("few").tolist() == ["7.0", "", "8.0"]

@@ -119,11 +119,11 @@ def test_what_a_measure_is_not_taken_from_is_told(source, said):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("what", [{"reward": np.nan}, {"distance_m": np.inf}])
-def test_what_is_not_finite_fails_the_trial(what):
+@pytest.mark.parametrize("what", [{"reward": np.nan}, {"distance_m": np.inf}, {"reward": -1e101}])
+def test_what_is_not_finite_or_huge_fails_the_trial(what):
     meter = EpisodeMeter("training", 4, MEASURES)
     meter.add(transition(**what))
-    with pytest.raises(FloatingPointError, match=r"= (nan|inf) in training episode 4"):
+    with pytest.raises(FloatingPointError, match=r"= (nan|inf|-1e\+101) in training episode 4"):
         meter.row()
 
 
