@@ -281,7 +281,11 @@ def _sweep(
     table: SpecTable, where: str, known: tuple[type[Settings], TomlTable]
 ) -> Iterator[tuple[str, object]]:
     """Yield dotted keys with their lists of values."""
-    for key, values in flat(table):
+    entries = [*flat(table)]
+    keys_of_values = [key for key, _ in entries]
+    for key, values in entries:
+        if keys_of_values.count(key) > 1:
+            raise SpecError(f"{where}.{key} = {show(values)}: the key stands twice")
         head, _, tail = key.partition(".")
         if key not in ("preset", "agents", "topology") and not (head in SECTIONS and tail):
             keys = [*(f"{name}.*" for name in SECTIONS), "preset", "agents", "topology"]

@@ -174,6 +174,10 @@ def test_a_kind_of_the_users_that_allows_less(tmp_path, monkeypatch) -> None:
         ({"learner.ridge": [1.0, 1.0]}, r"sweep\.learner\.ridge = \[1\.0, 1\.0\]: holds the same"),
         ({"learner.ridge": [1, 1.0]}, r"sweep\.learner\.ridge: conditions '1' and '1\.0' are"),
         (
+            {"learner.ridge": [1.0, 2.0], "learner": {"ridge": [3.0]}},
+            r"sweep\.learner\.ridge = \[1\.0, 2\.0\]: the key stands twice",
+        ),
+        (
             {"learner.discount": [0.5, 0.9], "topology": ["chain", "chain:listed"]},
             r"^sweep\.topology: conditions ",
         ),
