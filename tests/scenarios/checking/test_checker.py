@@ -772,7 +772,7 @@ def test_the_documentation_counts_the_faults() -> None:
     page = Path(__file__).resolve().parents[3] / "docs" / "tutorials" / "scenario.md"
     text = " ".join(page.read_text(encoding="utf-8").split())
     counts = re.findall(
-        r"plant (\d+) faults: the checker catches (\d+), warns of (\d+), and is blind to (\d+)",
+        r"inject (\d+) faults: the checker finds (\d+), warns of (\d+), and misses (\d+)",
         text,
     )
     planted = len(FAULTS), len(WARNED), len(BLIND)
