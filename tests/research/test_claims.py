@@ -347,6 +347,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors-eight",
         "poses",
         "poses-controls",
+        "poses-controls-4",
         "poses-4",
         "poses-8",
         "pendulum",

@@ -23,6 +23,7 @@ LAST = "success last 5", "evaluation success"
         ("predictors-eight", TRAINED),
         ("poses", TRAINED),
         ("poses-controls", TRAINED),
+        ("poses-controls-4", TRAINED),
         ("poses-4", TRAINED),
         ("poses-8", TRAINED),
         ("predictors-cartpole-fine", (*LAST, "evaluation steps")),
