@@ -146,7 +146,7 @@ def fit_universal_law(times: Times) -> UniversalLaw:
     ratios = {name: _signed_ratio(own, constant) for name, own in limits.items()}
     quadratic = np.where(np.abs(quadratic) < ROUNDING * constant, 0.0, quadratic)
     squared = ratio_interval(constant - linear, quadratic)
-    best = Estimate(*(times.sizes[0] * np.sqrt(end) for end in squared))
+    best = Estimate(*(times.sizes[0] * np.sqrt(np.maximum(end, 0.0)) for end in squared))
     return UniversalLaw(best_size=best, time_at_smallest=float(constant.mean()), **ratios)
 
 

@@ -183,11 +183,13 @@ def combine(
         if not times.keys() & set(apart):
             for i, text in zip(at, apart, strict=False):
                 labels[i][condition] = text
-    keys = dict.fromkeys(k for part in parts for row in part.columns.values() for k in row)
+    # Without columns, the label is what conditions of several tables of scores have in common.
+    rows = [{c: row or {"name": c} for c, row in part.columns.items()} for part in parts]
+    keys = dict.fromkeys(k for part in rows for row in part.values() for k in row)
     columns = {
         new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}
-        for name, part, new in zip(names, parts, labels, strict=True)
-        for condition, row in part.columns.items()
+        for name, part, new in zip(names, rows, labels, strict=True)
+        for condition, row in part.items()
     }
 
     def rename(frame: pd.DataFrame, new: Mapping[str, str]) -> pd.DataFrame:
