@@ -288,13 +288,13 @@ def learning_curves() -> Figure:
     errors = results.values("pose", "final_orientation_deg")
     means = [na.bootstrap(errors[:, e : e + 2].mean(axis=1)) for e in episodes]
     draw_points(right, episodes + 1.5, means, line, "")
-    right.axhline(15.0, color=GRAY, linestyle=":")
+    right.axhline(15.0, color=GRAY, linestyle=":", label="required: 15 degrees")
     left.set(ylabel="success", ylim=(-0.05, 1.05))
     right.set(ylabel="final orientation error [deg]", ylim=(0.0, None))
     for axes in (left, right):
         axes.set(xlabel="episode of training", xticks=(1, 5, 10, 15, 20))
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
-    return titled(figure, "Two robots learn to push a box, also to an orientation")
+    return titled(figure, "Two robots learn to push a box to a position or a pose")
 
 
 def hierarchies() -> Figure:

@@ -52,11 +52,11 @@ class LeaderView(Scenario):
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Refuse; the scenario below starts episodes."""
-        raise NotImplementedError("the scenario below starts episodes")
+        raise RuntimeError("the scenario below starts episodes")
 
     def step(self, joint_action: IntArray) -> Transition:
         """Refuse; the agents below carry out options."""
-        raise NotImplementedError("the agents below carry out options")
+        raise RuntimeError("the agents below carry out options")
 
 
 class Leader:

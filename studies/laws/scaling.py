@@ -153,7 +153,7 @@ def _sentence(fitted: Fitted, size: str) -> str:
     if fitted.censored:
         counted += f", {fitted.censored} runs censored"
     if fitted.left_out:
-        counted += f"; {fitted.left_out} runs left out, whose seeds lack another size"
+        counted += f"; {fitted.left_out} runs left out because their seeds lack another size"
     text = f"{head}{law.curve.name}, {law.formula} ({counted})"
     for n, measured, e in law.held_out:
         inside = "inside" if e.low <= measured <= e.high else "outside"

@@ -11,6 +11,7 @@ from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..results.results import Results
 from ..results.score_tables import NUMBER
+from ..results.sizes import Sizes
 from ..spec.tables import label_but
 
 MAX_SIZE = 1_000_000_000
@@ -50,8 +51,8 @@ class SizeAxis(NamedTuple):
     def of(cls, results: Results, size: str | None = None) -> SizeAxis:
         """Return the axis of a swept key, or of its last part; by default of the team size.
 
-        The team size is the number of robots or agents that trials counted. Without counts it is
-        the only swept number that is no setting of learners or hierarchies.
+        The team size is the swept key that is the number of bodies, see `Sizes`. If trials did not
+        count them, it is the only swept number that is no setting of learners or hierarchies.
 
         Raises
         ------
@@ -60,12 +61,14 @@ class SizeAxis(NamedTuple):
             `MAX_SIZE`; one line.
         """
         columns = columns_of(results)
-        return cls.by(_size_key(columns, size, _counts(results)), columns)
+        is_counted = all("robots" in results.numbers(c) for c in results.conditions)
+        counted = Sizes.of(results, results.conditions).keys if is_counted else ()
+        return cls.by(_size_key(columns, size, counted), columns)
 
     @classmethod
     def planned(cls, columns: Columns) -> SizeAxis:
         """Return the axis of a study before it runs; see `of`."""
-        return cls.by(_size_key(columns, None, []), columns)
+        return cls.by(_size_key(columns, None, ()), columns)
 
     @classmethod
     def by(cls, key: str, columns: Columns) -> SizeAxis:
@@ -101,17 +104,8 @@ def check_size(name: str, size: float, where: str = "") -> None:
         raise SpecError(f"{name} = {shown}{where}: allowed are sizes from 1 to {MAX_SIZE:,}")
 
 
-def _counts(results: Results) -> list[dict[str, float]]:
-    """Return the numbers of robots and of agents by condition, as far as trials counted them."""
-    numbers = {condition: results.numbers(condition) for condition in results.conditions}
-    return [
-        {condition: float(own[name][0]) for condition, own in numbers.items()}
-        for name in ("robots", "agents")
-        if numbers and all(name in own for own in numbers.values())
-    ]
-
-
-def _size_key(columns: Columns, size: str | None, counts: Sequence[Mapping[str, float]]) -> str:
+def _size_key(columns: Columns, size: str | None, counted: Sequence[str]) -> str:
+    """Return the swept key that is named as size, or by default that of the counted bodies."""
     keys = dict.fromkeys(key for row in columns.values() for key in row)
     levels = {key: [row.get(key) for row in columns.values()] for key in keys}
     numbers = [k for k, own in levels.items() if all(map(_is_number, own)) and len({*own}) > 1]
@@ -120,12 +114,9 @@ def _size_key(columns: Columns, size: str | None, counts: Sequence[Mapping[str, 
         if key is None:
             raise SpecError(f"size = {size!r}: {closest(size, numbers)}; a swept key of numbers")
         return key
-    counted = [
-        key
-        for key in numbers
-        if any(all(float(str(columns[c][key])) == n for c, n in own.items()) for own in counts)
+    sizes = [key for key in numbers if key in counted] or [
+        key for key in numbers if key.partition(".")[0] not in ("learner", "topology")
     ]
-    sizes = counted or [k for k in numbers if k.partition(".")[0] not in ("learner", "topology")]
     if len(sizes) != 1:
         names = ", ".join(sizes or numbers) or "none"
         raise SpecError(f"size: name the swept key that is the size; those of numbers: {names}")

@@ -367,11 +367,8 @@ def _groups(
         level = _level(key, columns[c][key])
         rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
         members = groups.setdefault(rest, [])
-        if level in dict(members):
-            raise SpecError(
-                f"by = {by!r}: {dict(members)[level]!r} and {c!r} have the same value of it and "
-                "differ in no other key"
-            )
+        if level in (same := dict(members)):
+            raise SpecError(f"by = {by!r}: conditions {same[level]!r} and {c!r} differ in no key")
         members.append((level, c))
     known = {c: aliases(c, {key: columns[c][key]}) for c in conditions}
     return [(setting, _put_first(members, reference, known)) for setting, members in groups.items()]

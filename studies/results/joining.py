@@ -183,7 +183,7 @@ def combine(
         if not times.keys() & set(apart):
             for i, text in zip(at, apart, strict=False):
                 labels[i][condition] = text
-    # Without columns, the label is what conditions of several tables of scores have in common.
+    # Tables of scores with one condition column have no swept keys: their labels are compared.
     rows = [{c: row or {"name": c} for c, row in part.columns.items()} for part in parts]
     keys = dict.fromkeys(k for part in rows for row in part.values() for k in row)
     columns = {

@@ -6,6 +6,7 @@ meanings of the columns are in ``frame.attrs["columns"]`` by name.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -257,12 +258,13 @@ def pad_rows(rows: Sequence[Array]) -> Array:
 
 
 def row_means(values: pd.DataFrame) -> pd.Series:
-    """Return the mean of each row without its missing values."""
-    array = np.ascontiguousarray(values.to_numpy(dtype=float))
-    if not array.size:
-        return pd.Series(dtype=float)
-    mean = np.nanmean if np.isnan(array).any() else np.mean
-    return pd.Series(mean(array, axis=1), values.index)
+    """Return the mean of each row without its missing values.
+
+    Sums are rounded once, so that rows of the same values in another order have equal means.
+    """
+    known = (row[~np.isnan(row)] for row in values.to_numpy(dtype=float))
+    means = [math.fsum(row) / len(row) if len(row) else math.nan for row in known]
+    return pd.Series(means, values.index, dtype=float)
 
 
 def read(store: Store) -> Results:

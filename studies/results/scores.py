@@ -89,16 +89,16 @@ def plain_levels(levels: pd.Series) -> pd.Series:
 
 
 def alike_note(column: str, names: pd.Series, *, are_runs: bool = False) -> list[str]:
-    """Return a note on the first two names of a column that a reader takes for the same, if any.
+    """Return a note on two names of a column that a reader would take for the same, if any.
 
     They differ in white space, in the encoding of a character or, for runs, in the spelling of a
-    number.
+    number. The note does not depend on the order of the names.
 
     >>> alike_note("seed", pd.Series(["7", "07"]), are_runs=True)
     ["seed: '7' and '07' look alike, but are different names"]
     """
     known: dict[object, str] = {}
-    for name in names.unique():
+    for name in sorted(names.unique(), key=lambda name: (len(name), name)):
         key: object = unicodedata.normalize("NFKC", name).strip()
         if are_runs and NUMBER.fullmatch(str(key)):
             key = Decimal(str(key))

@@ -20,6 +20,7 @@ from .data import COSTS, DECISIONS, Place, ScalabilityData, paired
 from .fronts import (
     BudgetChoice,
     FrontPoint,
+    are_greatest,
     best_within,
     pareto_points,
     parse_budget,
@@ -96,7 +97,7 @@ class Scalability:
             return None
         shares = probability_of_best(list(self.data.sign * values.T))
         means = self.data.sign * values.mean(axis=0)
-        best = np.flatnonzero(means == means.max()).tolist()
+        best = np.flatnonzero(are_greatest(means)).tolist()
         return BestHierarchies(size, tuple(names[k] for k in best), float(shares[best].sum()))
 
     @cached_property

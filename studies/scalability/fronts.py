@@ -19,6 +19,8 @@ from .data import ScalabilityData, cost_of
 
 RESAMPLES = 2000
 """Bootstrap resamples of seeds; probabilities are then known to 0.02."""
+ROUNDING = 1e-13
+"""Relative difference of means that counts as rounding."""
 LIMIT = re.compile(r"\s*([\w.]+)\s*<=\s*([0-9.eE+-]+)\s*")
 """One part of a budget, such as ``messages <= 50``."""
 
@@ -168,9 +170,16 @@ def _best(
     return _shares_of_greatest(means) * allowed, allowed
 
 
+def are_greatest(means: Array) -> BoolArray:
+    """Return which means ``(..., n)`` are the greatest; those that differ by rounding only tie."""
+    greatest = means.max(axis=-1, keepdims=True)
+    ties: BoolArray = means >= greatest - ROUNDING * np.abs(greatest)
+    return ties
+
+
 def _shares_of_greatest(means: Array) -> Array:
     """Return 1 for the greatest value of each row; equal ones share it."""
-    greatest = means == means.max(axis=1, keepdims=True)
+    greatest = are_greatest(means)
     shares: Array = greatest / greatest.sum(axis=1, keepdims=True)
     return shares
 

@@ -34,6 +34,24 @@ def test_ties_are_not_broken_by_rounding(first, second, offset) -> None:
     assert p == pytest.approx(float(exact_p(own, other)), abs=1e-12)
 
 
+def test_means_over_items_in_another_order_tie(tmp_path) -> None:
+    table = tmp_path / "items.csv"
+    items = [("a", "x", [0.1, 0.2, 0.3]), ("b", "x", [0.3, 0.2, 0.1])]
+    rows = [
+        f"{condition},{agents},{seed},{item},{score}\n"
+        for agents in (2, 4, 8)
+        for condition, _, scores in items
+        for seed in range(6)
+        for item, score in enumerate(scores)
+    ]
+    table.write_text("topology,agents,seed,item,score\n" + "".join(rows))
+    loaded = na.load(table, columns=["condition=topology+agents"])
+    assert all(d.cliffs_delta == 0.0 for d in loaded.compare(by="topology").differences)
+    analysis = loaded.scalability(size="agents").analysis
+    assert analysis.best.hierarchies == ("a", "b")
+    assert not analysis.crossovers
+
+
 def test_tables_of_one_condition_column_are_grouped_by_condition(tmp_path) -> None:
     rng = np.random.default_rng(0)
     for name in ("one", "two"):
