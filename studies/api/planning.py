@@ -8,7 +8,6 @@ shorter as teams learn, and learning from all kept steps takes longer the more s
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from textwrap import wrap
 from time import perf_counter
@@ -19,11 +18,9 @@ import numpy as np
 from ...core.interface.measures import Measure, main_measure
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
-from ..laws.fitting import FEWEST
-from ..laws.size_axis import SizeAxis
 from ..presentation.progress import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION
-from ..results.power_text import exponent_text, planned_text
+from ..results.power_text import planned_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..trials.session import Session
@@ -111,18 +108,8 @@ class Plan:
                 self.smallest,
                 of_rates=self.measure.is_rate,
             )
-        yield from self._exponents()
         for warning in self.warnings:
             yield from wrap(warning, WIDTH)
-
-    def _exponents(self) -> Iterator[str]:
-        """Yield which differences of scaling exponents the study can detect, if it sweeps sizes."""
-        with suppress(SpecError):
-            groups = SizeAxis.planned(self.outline.columns).groups()
-            _, fewest = min((len(own), [*own.values()]) for own in groups.values())
-            if len(fewest) >= FEWEST:
-                yield ""
-                yield from exponent_text(fewest, len(self.outline.seeds), max(1, len(groups) - 1))
 
 
 def plan(

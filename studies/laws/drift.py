@@ -62,19 +62,13 @@ class Mixture(NamedTuple):
         return most + float(np.log(self.weights @ np.exp(each - most) + TINY))
 
 
-class Drift(NamedTuple):
-    """Deviation from a law at a size, for each of `SIGMAS`."""
+def drift(
+    x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: Array
+) -> tuple[Array, Array, Array]:
+    """Return how far a law that was fitted at ``x`` may be left at `at`, for each of `SIGMAS`.
 
-    weights: Array
-    """Posterior weights ``(s,)``."""
-    shifts: Array
-    """Expected deviations from the law ``(s,)``."""
-    variances: Array
-    """Variances of the deviations beyond those of the law's parameters ``(s,)``."""
-
-
-def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: Array) -> Drift:
-    """Return how far a law that was fitted at ``x`` may be left at `at`.
+    Returns their posterior weights, the expected deviations from the law, and the variances of
+    the deviations beyond those of the law's parameters, ``(s,)`` each.
 
     Parameters
     ----------
@@ -111,7 +105,7 @@ def drift(x: Array, at: float, left: Array, slopes: Array, slope: Array, noise: 
     variances = scales * (walk[-1, -1] - carried @ walk[:-1, -1]) + (unseen * spread).sum(axis=1)
     weights = PRIOR * np.exp(likelihoods - likelihoods.max())
     extra = np.maximum(variances - variances[0], 0.0)
-    return Drift(weights / weights.sum(), shifts, extra)
+    return weights / weights.sum(), shifts, extra
 
 
 def integrated_wiener(x: Array) -> Array:

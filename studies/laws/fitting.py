@@ -29,11 +29,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.numerics import BoolArray, optimize, special
+from ...core.numerics import BoolArray, optimize, pd, special, stats
 from ..results.statistics import Array, Estimate
 from .curves import POWER, Curve
-from .drift import Drift, Mixture, drift
-from .inference import mean_interval
+from .drift import Mixture, drift
+from .inference import mean_interval, student_quantile
 from .samples import LOGIT, Sample, check_sizes
 
 RESAMPLES = 400
@@ -71,6 +71,8 @@ class Law(NamedTuple):
     """Variance of a seed of weight 1 at a size around its own mean."""
     held_out: tuple[tuple[float, float, Estimate], ...] = ()
     """For each size that was left out: size, measured mean, its 90% prediction."""
+    left_out: int = 0
+    """Number of runs that were left out because their seeds lack another size."""
 
     @property
     def seeds(self) -> int:
@@ -85,17 +87,16 @@ class Law(NamedTuple):
     def exponents(self, level: float = 0.95) -> dict[str, Estimate]:
         """Return the meaning of the parameters, with Student intervals of resampled seeds."""
         values = self.curve.exponents(self.parameters)
-        each = [self.curve.exponents(p) for p in self.resampled]
-        reach = float(special.stdtrit(self.seeds - 1, 0.5 + level / 2.0))
-        estimates = {}
-        for name, value in values.items():
-            half = reach * self._spread(np.array([own[name] for own in each]))
-            estimates[name] = Estimate(*map(np.asarray, (value, value - half, value + half)))
-        return estimates
+        resampled = pd.DataFrame([self.curve.exponents(p) for p in self.resampled])
+        halves = student_quantile(self.seeds, level) * self._spread(resampled.to_numpy())
+        return {
+            name: Estimate(*map(np.asarray, (value, value - half, value + half)))
+            for (name, value), half in zip(values.items(), halves, strict=True)
+        }
 
-    def _spread(self, resampled: Array) -> float:
-        """Return a standard error; resampling few seeds underestimates it by a known factor."""
-        return float(resampled.std(axis=0, ddof=1)) * math.sqrt(self.seeds / (self.seeds - 1))
+    def _spread(self, resampled: Array) -> Array:
+        """Return standard errors; resampling few seeds underestimates them by a known factor."""
+        return np.asarray(resampled.std(axis=0, ddof=1)) * math.sqrt(self.seeds / (self.seeds - 1))
 
     def predict(self, size: float, level: float = 0.9, seeds: int | None = None) -> Estimate:
         """Return the law at a size, with an interval of the mean of so many new seeds there.
@@ -109,66 +110,46 @@ class Law(NamedTuple):
             rates = self._new_rates(size, seeds or self.seeds)
             low, high = np.quantile(rates, shares, method="inverted_cdf").tolist()
         else:
-            known = self.distribution(size, seeds)
+            known = self.distribution(size, self.noise / (seeds or self.seeds))
             low, high = self.sample.scale.back(np.array([known.quantile(p) for p in shares]))
         value = float(self.curve_at(np.array([size]))[0])
         ends = min(value, float(low)), max(value, float(high))
         return Estimate(*(np.asarray(np.clip(end, *self.sample.bounds)) for end in (value, *ends)))
 
-    def distribution(self, size: float, seeds: int | None = None) -> Mixture:
-        """Return the distribution of the mean of new seeds on the scale, the drift included."""
-        return self._distribution(size, self.noise / (seeds or self.seeds))
+    def distribution(self, size: float, noise: float | None = None) -> Mixture:
+        """Return the distribution of the mean of new seeds on the scale, the drift included.
 
-    def _distribution(self, size: float, noise: float) -> Mixture:
-        """Return the distribution of the law and of a mean; `noise` is its variance at weight 1."""
-        x = np.log([size])
+        `noise` is the variance of that mean at weight 1, by default that of as many seeds as were
+        fitted. The parts of the variance that are estimated have Satterthwaite's (1946) degrees of
+        freedom, at most `MOST_FREEDOM`.
+        """
+        sample = self.sample
+        fitted, x = np.log(sample.sizes), np.log([size])
         value = self.curve.of(self.parameters, x)
-        parts = [
-            (self._spread(self._resampled_at(x)) ** 2, self.seeds - 1.0),
-            (noise / float(self.sample.scale.weight(value)[0]), self._freedom),
-        ]
-        left = self._drift(x)
-        return _mixture(left.weights, float(value[0]) + left.shifts, left.variances, parts)
-
-    @property
-    def _freedom(self) -> float:
-        return (self.seeds - 1.0) * len(self.sample.sizes)
+        drawn = np.array([self.curve.of(p, x)[0] for p in self.resampled])
+        of_fit = float(self._spread(drawn)) ** 2
+        own_noise = self.noise / self.seeds if noise is None else noise
+        of_seeds = own_noise / float(sample.scale.weight(value)[0])
+        slopes = self.curve.slopes(self.parameters, np.append(fitted, x))
+        errors = self.scatter / self.seeds / sample.weights
+        weights, shifts, variances = drift(
+            fitted, float(x[0]), self.left, slopes[:-1], slopes[-1], errors
+        )
+        total = variances + of_fit + of_seeds + FLAT**2
+        lack = (of_fit**2 + of_seeds**2 / len(fitted)) / (self.seeds - 1.0)
+        freedoms = np.minimum(total**2 / (lack + FLAT**6), MOST_FREEDOM)
+        return Mixture(weights, float(value[0]) + shifts, total, freedoms)
 
     def _new_rates(self, size: float, seeds: int) -> Array:
         """Return draws of the mean rate of new seeds: binomial, with their effective number."""
         rng = np.random.default_rng(0)
-        rates = special.expit(self._distribution(size, 0.0).sample(rng, DRAWS))
+        rates = special.expit(self.distribution(size, 0.0).sample(rng, DRAWS))
         count = max(1, round(4.0 * seeds / self.noise))
         return rng.binomial(count, rates) / count
-
-    def _resampled_at(self, x: Array) -> Array:
-        """Return the laws of resampled seeds ``(RESAMPLES,)`` at ``x`` ``(1,)``."""
-        return np.array([self.curve.of(p, x)[0] for p in self.resampled])
-
-    def _drift(self, x: Array) -> Drift:
-        """Return the possible deviations from the law at ``x`` ``(1,)``."""
-        fitted = np.log(self.sample.sizes)
-        slopes = self.curve.slopes(self.parameters, np.append(fitted, x))
-        noise = self.scatter / self.seeds / self.sample.weights
-        return drift(fitted, float(x[0]), self.left, slopes[:-1], slopes[-1], noise)
 
     def curve_at(self, sizes: Array) -> Array:
         """Return the law's values ``(k,)`` at sizes."""
         return self.sample.scale.back(self.curve.of(self.parameters, np.log(sizes)))
-
-
-def _mixture(
-    weights: Array, means: Array, variances: Array, estimated: Sequence[tuple[float, float]]
-) -> Mixture:
-    """Return a mixture of Student's distributions.
-
-    `variances` ``(s,)`` are known exactly. `estimated` are further variances, each with its degrees
-    of freedom. Their sum has Satterthwaite's (1946) degrees of freedom, at most `MOST_FREEDOM`.
-    """
-    total = variances + sum(part for part, _ in estimated) + FLAT**2
-    lack = sum(part**2 / freedom for part, freedom in estimated)
-    freedoms = np.minimum(total**2 / (lack + FLAT**6), MOST_FREEDOM)
-    return Mixture(weights, means, total, freedoms)
 
 
 def fit(curve: Curve, sample: Sample, resamples: int = RESAMPLES) -> Law:
@@ -285,28 +266,16 @@ def _held_out(curve: Curve, sample: Sample) -> list[tuple[float, tuple[float, fl
     return checks
 
 
-class Contrast(NamedTuple):
-    """Difference of the exponents of two laws."""
+def compare(law: Law, base: Law) -> tuple[Estimate, float]:
+    """Return the difference of the exponents of two power laws of the same seeds and sizes, and p.
 
-    difference: Estimate
-    p: float
-    """P-value of no difference, Student's over seeds."""
-    deviation: float
-    """Standard deviation of the differences of single seeds."""
-
-
-def compare(law: Law, base: Law) -> Contrast:
-    """Return the difference of the exponents of two power laws of the same seeds and sizes."""
-    slopes = [
-        np.polyfit(np.log(own.sample.sizes), own.sample.values.T, 1, w=np.sqrt(own.sample.weights))[
-            0
-        ]
-        for own in (law, base)
-    ]
-    each = slopes[0] - slopes[1]
-    difference = mean_interval(each)
-    deviation = float(each.std(ddof=1))
-    error = deviation / math.sqrt(len(each))
-    t = abs(float(difference.value)) / error if error > FLAT else math.inf
-    p = 1.0 if not difference.value else float(2.0 * special.stdtr(len(each) - 1, -t))
-    return Contrast(difference, p, deviation)
+    p, for no difference, is Student's over seeds.
+    """
+    first, second = (
+        np.polyfit(np.log(own.sizes), own.values.T, 1, w=np.sqrt(own.weights))[0]
+        for own in (law.sample, base.sample)
+    )
+    difference = mean_interval(first - second)
+    if np.std(first - second) <= FLAT:  # the t of rounding says nothing
+        return difference, float(difference.value == 0.0)
+    return difference, float(stats.ttest_1samp(first - second, 0.0).pvalue)

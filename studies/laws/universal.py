@@ -17,6 +17,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from ...core.numerics import pd
 from ..results.statistics import Array, Estimate
 from .inference import ratio_interval
 
@@ -25,30 +26,6 @@ MIN_SIZES = 3
 """Fewest sizes to which the universal scalability law is fitted."""
 ROUNDING = 1e-9
 """Coherency that counts as rounding."""
-
-
-class Times(NamedTuple):
-    """Times of a task by seed and size."""
-
-    sizes: Array
-    """``(n_sizes,)`` increasing."""
-    values: Array
-    """``(n_seeds, n_sizes)`` positive."""
-    scaling: Scaling
-
-    @property
-    def factors(self) -> Array:
-        """Sizes relative to the smallest, ``(n_sizes,)``."""
-        return self.sizes / self.sizes[0]
-
-
-class Speedup(NamedTuple):
-    """Speed-up at one size relative to the smallest size."""
-
-    speedup: Estimate
-    efficiency: Estimate
-    serial_fraction: Estimate | None
-    """None at the smallest size."""
 
 
 class UniversalLaw(NamedTuple):
@@ -84,24 +61,34 @@ class UniversalLaw(NamedTuple):
         )
 
 
-def speedups(times: Times) -> dict[float, Speedup]:
-    """Return the speed-up by size.
+def speedups(times: pd.DataFrame, scaling: Scaling) -> dict[float, dict[str, Estimate]]:
+    """Return by size speed-up, efficiency and, above the smallest size, serial fraction.
+
+    Parameters
+    ----------
+    times
+        Positive times of a task: a row for each seed, a column for each size, sizes increasing.
+    scaling
+        Whether the task stays the same or grows with the team.
 
     Examples
     --------
-    >>> halved = Times(np.array([1.0, 2.0]), np.array([[8.0, 4.0], [6.0, 3.0]]), "strong")
-    >>> own = speedups(halved)[2.0]
-    >>> float(own.speedup.value), float(own.efficiency.value), float(own.serial_fraction.value)
-    (2.0, 1.0, 0.0)
+    >>> halved = pd.DataFrame({1.0: [8.0, 6.0], 2.0: [4.0, 3.0]})
+    >>> {name: float(own.value) for name, own in speedups(halved, "strong")[2.0].items()}
+    {'speed-up': 2.0, 'efficiency': 1.0, 'serial fraction': 0.0}
     """
+    (first, base), *_ = times.items()
     result = {}
-    for size, factor, own in zip(times.sizes, times.factors, times.values.T, strict=True):
-        ratio = ratio_interval(times.values[:, 0], own)
-        scale = float(factor) if times.scaling == "weak" else 1.0
-        speedup = Estimate(*(scale * end for end in ratio))
-        efficiency = Estimate(*(end / factor for end in speedup))
-        fraction = serial_fraction(speedup, float(factor), times.scaling) if factor > 1.0 else None
-        result[float(size)] = Speedup(speedup, efficiency, fraction)
+    for size, own in times.items():
+        factor = float(size / first)
+        ratio = ratio_interval(base.to_numpy(), own.to_numpy())
+        speedup = Estimate(*(end * (factor if scaling == "weak" else 1.0) for end in ratio))
+        result[float(size)] = {
+            "speed-up": speedup,
+            "efficiency": Estimate(*(end / factor for end in speedup)),
+        }
+        if factor > 1.0:
+            result[float(size)]["serial fraction"] = serial_fraction(speedup, factor, scaling)
     return result
 
 
@@ -126,28 +113,31 @@ def serial_fraction(speedup: Estimate, factor: float, scaling: Scaling) -> Estim
     return Estimate(np.asarray(value), np.asarray(low), np.asarray(high))
 
 
-def fit_universal_law(times: Times) -> UniversalLaw:
-    """Fit the universal scalability law by least squares of relative errors.
+def fit_universal_law(times: pd.DataFrame, scaling: Scaling) -> UniversalLaw:
+    """Fit the universal scalability law to times, see `speedups`, by relative least squares.
 
     Raises
     ------
     ValueError
         If there are fewer than `MIN_SIZES` sizes.
     """
-    factors = times.factors
+    factors = relative_sizes(times)
     if len(factors) < MIN_SIZES:
         raise ValueError(f"{len(factors)} sizes: the universal scalability law needs {MIN_SIZES}")
-    work = times.values * (factors if times.scaling == "strong" else 1.0)
+    work = times.to_numpy() * (factors if scaling == "strong" else 1.0)
     terms = np.stack([np.ones_like(factors), factors - 1.0, factors * (factors - 1.0)], axis=1)
     weights = 1.0 / work.mean(axis=0)
-    solution = np.linalg.pinv(terms * weights[:, None]) * weights
-    constant, linear, quadratic = solution @ work.T
-    limits = {"contention": linear, "coherency": quadratic}
-    ratios = {name: _signed_ratio(own, constant) for name, own in limits.items()}
+    constant, linear, quadratic = np.linalg.pinv(terms * weights[:, None]) * weights @ work.T
+    contention, coherency = (_signed_ratio(own, constant) for own in (linear, quadratic))
     quadratic = np.where(np.abs(quadratic) < ROUNDING * constant, 0.0, quadratic)
     squared = ratio_interval(constant - linear, quadratic)
-    best = Estimate(*(times.sizes[0] * np.sqrt(np.maximum(end, 0.0)) for end in squared))
-    return UniversalLaw(best_size=best, time_at_smallest=float(constant.mean()), **ratios)
+    best = Estimate(*(times.columns[0] * np.sqrt(np.maximum(end, 0.0)) for end in squared))
+    return UniversalLaw(contention, coherency, best, float(constant.mean()))
+
+
+def relative_sizes(times: pd.DataFrame) -> Array:
+    """Return the sizes of `speedups` relative to the smallest ``(n_sizes,)``."""
+    return times.columns.to_numpy(dtype=float) / times.columns[0]
 
 
 def _signed_ratio(numerator: Array, denominator: Array) -> Estimate:

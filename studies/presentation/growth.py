@@ -32,7 +32,7 @@ def growth_figures(results: Results) -> dict[str, Figure]:
     for measure, name in REPORTED.items():
         with suppress(SpecError):
             analysis = scaling_law(results, measure)
-            if any(fitted.law is not None for fitted in analysis.fits):
+            if analysis.laws:
                 drawn[name] = draw_laws(analysis)
     return drawn
 
@@ -42,7 +42,7 @@ def draw_laws(analysis: ScalingLaw) -> Figure:
 
     The axis shows what was measured and the laws, even if a band extends further.
     """
-    known = [(f.group or analysis.title, f.law) for f in analysis.fits if f.law is not None]
+    known = [(group or analysis.title, law) for group, law in analysis.laws.items()]
     sizes = sorted({float(n) for _, law in known for n in law.sample.sizes})
     last = max([BEYOND * sizes[-1], *analysis.predicted]) if sizes else 1.0
     with figures.apply_style():

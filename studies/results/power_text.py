@@ -4,14 +4,11 @@ import math
 from collections.abc import Sequence
 from textwrap import wrap
 
-import numpy as np
-
 from ..errors import WIDTH
 from .notation import format_number, wrapped
 from .permutation_tests import LEVEL
 from .power import (
     SMALLEST,
-    USUAL_LOG_DEVIATION,
     WANTED,
     detectable,
     detectable_independent,
@@ -20,13 +17,6 @@ from .power import (
     seeds_needed,
 )
 from .statistics import Array
-
-APART = 0.2
-"""Difference of exponents of which it is told how many seeds find it."""
-
-
-LARGEST = 4096
-"""Agents of the largest teams that are proposed."""
 
 
 def power_text(
@@ -112,62 +102,6 @@ def planned_text(
     text = f"Differences of {what}, every condition with the first, p adjusted; {supposed}."
     known = power_text(seeds, comparisons, deviation or 1.0, smallest, unit=unit)
     return [*known, *wrap(text, WIDTH)]
-
-
-def exponent_text(
-    sizes: Sequence[float],
-    seeds: int,
-    comparisons: int = 1,
-    deviation: float = USUAL_LOG_DEVIATION,
-) -> list[str]:
-    r"""Return lines on which exponents paired seeds tell apart, and what it takes for `APART`.
-
-    The exponent of a seed is the slope of its logarithms over those of the sizes, so that exponents
-    deviate by what logarithms do, over the root of the sum of squares of those of the sizes.
-
-    Parameters
-    ----------
-    sizes
-        That are run, `seeds` times each.
-    seeds
-        How many.
-    comparisons
-        Of exponents, over which p is adjusted.
-    deviation
-        Of the differences of logarithms of single seeds at a size.
-
-    Examples
-    --------
-    >>> print(*exponent_text([2, 4, 8, 16], 20), sep="\n")
-    Exponents: 20 seeds of sizes 2 to 16 detect a difference of exponents of 0.21
-      with power 0.80. A difference of 0.20 needs about 23 seeds, or sizes up to 32.
-    """
-    goal = format_number(APART)
-    counted = f"{seeds} seed{'s' * (seeds != 1)}"
-    enough = seeds_for(APART, deviation / _reach(sizes), comparisons)
-    larger = list(sizes)
-    while detectable(deviation / _reach(larger), seeds, comparisons) > APART:
-        larger.append(2.0 * larger[-1])
-        if larger[-1] > LARGEST:
-            break
-    needs = f" A difference of {goal} needs about {enough} seeds" if enough else ""
-    if seeds < seeds_needed(comparisons):
-        text = f"{counted} are too few for a significant difference; at least "
-        text += f"{seeds_needed(comparisons)} are needed.{needs}{'.' * bool(needs)}"
-    else:
-        least = format_number(detectable(deviation / _reach(sizes), seeds, comparisons))
-        text = f"{counted} of sizes {sizes[0]:g} to {sizes[-1]:g} detect a difference of "
-        text += f"exponents of {least} with power {format_number(WANTED)}."
-        if len(larger) > len(sizes) and needs:
-            up_to = f", or sizes up to {larger[-1]:g}" if larger[-1] <= LARGEST else ""
-            text += f"{needs}{up_to}."
-    return wrapped(f"Exponents: {text}")
-
-
-def _reach(sizes: Sequence[float]) -> float:
-    """Return the root of the sum of squares of the logarithms of sizes about their mean."""
-    logs = np.log(sizes)
-    return float(np.linalg.norm(logs - logs.mean()))
 
 
 def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool = True) -> list[str]:

@@ -6,26 +6,15 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import permutations
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
-import numpy as np
-
-from ..laws.inference import sign_change
-from ..laws.universal import MIN_SIZES, Speedup, UniversalLaw, fit_universal_law, speedups
+from ...core.numerics import pd
+from ..laws.universal import MIN_SIZES, UniversalLaw, fit_universal_law, speedups
 from ..results.analysis import Summary
 from ..results.notation import format_estimate, format_number
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
-from .data import COSTS, DECISIONS, Place, ScalabilityData, paired
-from .fronts import (
-    BudgetChoice,
-    FrontPoint,
-    are_greatest,
-    best_within,
-    pareto_points,
-    parse_budget,
-    probability_of_best,
-)
+from . import fronts
+from .data import DECISIONS, HEADINGS, Place, ScalabilityData
 
 T = TypeVar("T")
 LIKELY = 0.5
@@ -36,32 +25,7 @@ BEST_NAMED = 3
 """Number of hierarchies that it describes if there are more: the best at the largest size."""
 
 
-class Crossover(NamedTuple):
-    """A size from which on one hierarchy beats another."""
-
-    better: str
-    worse: str
-    size: Estimate
-
-
-class BestHierarchies(NamedTuple):
-    """The hierarchy, or the hierarchies, with the best mean performance at the largest size."""
-
-    size: float
-    hierarchies: tuple[str, ...]
-    probability: float
-    """Probability over seeds that one of them is the best of all measured at this size."""
-
-
-class BestSize(NamedTuple):
-    """The measured size with the best mean performance of one hierarchy."""
-
-    size: float
-    probability: float
-    """Probability over seeds that it is the best of the measured sizes."""
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scalability:
     """Speed-up, laws, crossovers, Pareto fronts and the best hierarchy within a budget."""
 
@@ -70,35 +34,29 @@ class Scalability:
     """Limits of costs, such as ``messages <= 50``; empty for no budget."""
 
     @cached_property
-    def speedups(self) -> Mapping[str, Mapping[float, Speedup]]:
-        """Speed-up of the task by hierarchy and size, where times of paired seeds are known."""
-        return {
-            name: speedups(times)
-            for name in self.data.hierarchies
-            if (times := self.data.times_of(name)) is not None
-        }
-
-    @cached_property
-    def laws(self) -> Mapping[str, UniversalLaw]:
-        """Universal scalability law by hierarchy, where there are enough sizes."""
+    def times(self) -> Mapping[str, pd.DataFrame]:
+        """Times of the task by hierarchy, where times of paired seeds are known."""
         times = {name: self.data.times_of(name) for name in self.data.hierarchies}
+        return {name: own for name, own in times.items() if own is not None}
+
+    @cached_property
+    def speedups(self) -> Mapping[str, Mapping[float, Mapping[str, Estimate]]]:
+        """Speed-up, efficiency and serial fraction by hierarchy and size."""
+        return {name: speedups(own, self.data.scaling) for name, own in self.times.items()}
+
+    @cached_property
+    def universal_laws(self) -> Mapping[str, UniversalLaw]:
+        """Universal scalability law by hierarchy, where there are enough sizes."""
         return {
-            name: fit_universal_law(own)
-            for name, own in times.items()
-            if own is not None and len(own.sizes) >= MIN_SIZES
+            name: fit_universal_law(own, self.data.scaling)
+            for name, own in self.times.items()
+            if own.shape[1] >= MIN_SIZES
         }
 
     @cached_property
-    def best(self) -> BestHierarchies | None:
-        """The best at the largest size; None without two hierarchies and two seeds there."""
-        size = self.data.all_sizes[-1]
-        names, (values,) = self.data.paired_at(size, [])
-        if len(names) < 2 or len(values) < 2:
-            return None
-        shares = probability_of_best(list(self.data.sign * values.T))
-        means = self.data.sign * values.mean(axis=0)
-        best = np.flatnonzero(are_greatest(means)).tolist()
-        return BestHierarchies(size, tuple(names[k] for k in best), float(shares[best].sum()))
+    def best(self) -> tuple[tuple[str, ...], float] | None:
+        """The best hierarchies at the largest size, and how probable it is that they are."""
+        return fronts.best_hierarchies(self.data)
 
     @cached_property
     def named(self) -> tuple[str, ...]:
@@ -112,43 +70,25 @@ class Scalability:
         return tuple(name for name in data.hierarchies if name in ranked[:BEST_NAMED])
 
     @cached_property
-    def best_sizes(self) -> Mapping[str, BestSize]:
-        """Best measured size by hierarchy."""
-        best = {}
-        for name in self.data.hierarchies:
-            sizes = self.data.sizes(name)
-            values = paired([self.data.performances[name, n] for n in sizes])
-            if len(values) > 1:
-                shares = probability_of_best(list(self.data.sign * values.T))
-                k = int((self.data.sign * values.mean(axis=0)).argmax())
-                best[name] = BestSize(sizes[k], float(shares[k]))
-        return best
+    def best_sizes(self) -> Mapping[str, tuple[float, float]]:
+        """Best measured size by hierarchy, and how probable it is that it is the best."""
+        return fronts.best_sizes(self.data)
 
     @cached_property
-    def crossovers(self) -> tuple[Crossover, ...]:
-        """Sizes from which on one hierarchy beats another, of all pairs."""
-        changes = []
-        for better, worse in permutations(self.data.hierarchies, 2):
-            sizes = [n for n in self.data.sizes(better) if n in self.data.sizes(worse)]
-            columns = [self.data.performances[name, n] for name in (better, worse) for n in sizes]
-            values = paired(columns)
-            if len(sizes) < 2 or len(values) < 2:
-                continue
-            differences = self.data.sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
-            size = sign_change(sizes, differences)
-            if size is not None:
-                changes.append(Crossover(better, worse, size))
-        return tuple(changes)
+    def crossovers(self) -> Sequence[tuple[str, str, Estimate]]:
+        """Better and worse hierarchy, and the size from which on the one beats the other."""
+        return fronts.crossovers(self.data)
 
     @cached_property
-    def fronts(self) -> tuple[FrontPoint, ...]:
+    def fronts(self) -> pd.DataFrame:
         """Every hierarchy at every size with every cost, and whether it is on the Pareto front."""
-        return tuple(pareto_points(self.data))
+        return fronts.pareto_points(self.data)
 
     @cached_property
-    def choices(self) -> tuple[BudgetChoice, ...]:
+    def choices(self) -> pd.DataFrame:
         """Best hierarchy within the budget by size; empty without a budget."""
-        return tuple(best_within(self.data, parse_budget(self.budget))) if self.budget else ()
+        limits = fronts.parse_budget(self.budget) if self.budget else {}
+        return fronts.best_within(self.data, limits) if limits else pd.DataFrame()
 
     @cached_property
     def cost_estimates(self) -> Mapping[str, Mapping[Place, Estimate]]:
@@ -169,41 +109,17 @@ class Scalability:
             for size in self.data.sizes(name):
                 place = name, size
                 estimates = {self.data.performance_title: self.data.performance_estimates[place]}
-                own = self.speedups.get(name, {}).get(size)
-                if own is not None:
-                    estimates["speed-up"] = own.speedup
-                    estimates["efficiency"] = own.efficiency
-                    if own.serial_fraction is not None:
-                        estimates["serial fraction"] = own.serial_fraction
+                estimates |= self.speedups.get(name, {}).get(size, {})
                 for cost, known in self.cost_estimates.items():
-                    if place in known:
-                        estimates[COSTS[cost].heading] = known[place]
+                    estimates |= {HEADINGS[cost]: known[place]} if place in known else {}
                 seeds = len(self.data.performances[place])
                 lines.append(Summary(f"{name}, {size:g} {self.data.size}", seeds, estimates))
         return tuple(lines)
 
     @property
-    def law_summaries(self) -> tuple[Summary, ...]:
-        """A line for every hierarchy with a universal scalability law."""
-        lines = []
-        for name, law in self.laws.items():
-            estimates = {"contention": law.contention, "coherency": law.coherency}
-            best = law.best_size_within(self.data.sizes(name)[-1])
-            if best is not None:
-                estimates[f"best number of {self.data.size}"] = best
-            seeds = len(self.data.performances[name, self.data.sizes(name)[0]])
-            lines.append(Summary(name, seeds, estimates))
-        return tuple(lines)
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """The findings as sentences, which make one paragraph."""
-        return tuple(self._sentences())
-
-    @property
     def paragraph(self) -> str:
         """The findings as one paragraph."""
-        return " ".join(self.sentences)
+        return " ".join(self._sentences())
 
     def _sentences(self) -> Iterator[str]:
         data = self.data
@@ -224,40 +140,40 @@ class Scalability:
     def _best_sentences(self) -> Iterator[str]:
         """Yield which hierarchy is the best, and which hierarchies other sentences name."""
         data = self.data
-        best = self.best
-        if best is not None:
-            names = best.hierarchies
-            mean = format_estimate(data.performance_estimates[names[0], best.size])
+        largest = data.all_sizes[-1]
+        if self.best is not None:
+            names, probability = self.best
+            mean = format_estimate(data.performance_estimates[names[0], largest])
             has = f"{names[0]} has" if len(names) == 1 else f"{len(names)} hierarchies share"
             yield (
-                f"With {best.size:g} {data.size}, {has} the best mean of the "
-                f"{len(data.at_size(best.size))} measured, {mean}, with probability "
-                f"{format_number(best.probability)} over seeds."
+                f"With {largest:g} {data.size}, {has} the best mean of the "
+                f"{len(data.at_size(largest))} measured, {mean}, with probability "
+                f"{format_number(probability)} over seeds."
             )
         if self.named != data.hierarchies:
             yield (
                 f"The next sentences name the {len(self.named)} best hierarchies with "
-                f"{data.all_sizes[-1]:g} {data.size}; the tables have all."
+                f"{largest:g} {data.size}; the tables have all."
             )
 
     def _size_sentences(self) -> Iterator[str]:
         size = self.data.size
         efficiencies: dict[float, list[str]] = {}
         for name, own in self._of_named(self.speedups):
-            text = f"{format_estimate(own[max(own)].efficiency)} for {name}"
+            text = f"{format_estimate(own[max(own)]['efficiency'])} for {name}"
             efficiencies.setdefault(max(own), []).append(text)
         for largest, texts in efficiencies.items():
             yield f"With {largest:g} {size}, the efficiency is {_join(texts)}."
         places: dict[str, list[str]] = {}
-        for name, law in self._of_named(self.laws):
-            largest = self.data.sizes(name)[-1]
-            places.setdefault(_place(law, largest, size), []).append(name)
+        for name, law in self._of_named(self.universal_laws):
+            place = place_of_maximum(law, self.data.sizes(name)[-1], size)
+            places.setdefault(place, []).append(name)
         for place, names in places.items():
             yield f"For {_join(names)}, {place}."
         likely = [
-            f"{best.size:g} for {name} (probability {format_number(best.probability)})"
-            for name, best in self._of_named(self.best_sizes)
-            if best.probability > LIKELY
+            f"{best:g} for {name} (probability {format_number(probability)})"
+            for name, (best, probability) in self._of_named(self.best_sizes)
+            if probability > LIKELY
         ]
         if likely:
             yield f"Performance is best with this number of {size}: {_join(likely)}."
@@ -270,7 +186,7 @@ class Scalability:
         if len(data.hierarchies) < 2:
             yield "There is one hierarchy, so that nothing can cross over."
             return
-        known = [c for c in self.crossovers if c.better in self.named and c.worse in self.named]
+        known = [own for own in self.crossovers if {*own[:2]} <= {*self.named}]
         for better, worse, size in known:
             yield f"From {format_estimate(size)} {data.size} on, {better} beats {worse}."
         other = "other " if known else ""
@@ -289,30 +205,24 @@ class Scalability:
 
     def _front_sentences(self) -> Iterator[str]:
         largest = self.data.all_sizes[-1]
+        points = self.fronts[self.fronts["size"] == largest]
         fronts: dict[str, list[str]] = {}
-        for cost in dict.fromkeys(point.cost for point in self.fronts):
-            members = [
-                f"{p.hierarchy} ({format_number(p.probability)})"
-                for p in self.fronts
-                if p.cost == cost and p.size == largest and p.probability > LIKELY
-            ]
-            heading = COSTS[cost].heading.partition(" [")[0]
+        for cost, own in points[points["probability"] > LIKELY].groupby("cost", sort=False):
+            members = [f"{p.hierarchy} ({format_number(p.probability)})" for p in own.itertuples()]
+            heading = HEADINGS[cost].partition(" [")[0]
             fronts.setdefault(_join(members), []).append(heading)
         for members_text, costs in fronts.items():
-            if members_text:
-                yield (
-                    f"With {largest:g} {self.data.size}, on the Pareto front of performance "
-                    f"against {_join(costs)} (with the probability over seeds): {members_text}."
-                )
+            yield (
+                f"With {largest:g} {self.data.size}, on the Pareto front of performance "
+                f"against {_join(costs)} (with the probability over seeds): {members_text}."
+            )
 
     def _budget_sentences(self) -> Iterator[str]:
-        for choice in self.choices:
-            where = f"Within {self.budget}, with {choice.size:g} {self.data.size}"
+        for choice in self.choices.itertuples():
+            with_size = f"{choice.size:g} {self.data.size}"
+            where = f"Within {self.budget}, with {with_size}"
             if choice.unknown:
-                yield (
-                    f"With {choice.size:g} {self.data.size}, a cost of {_join(choice.unknown)} is "
-                    "not known."
-                )
+                yield f"With {with_size}, a cost of {_join(choice.unknown)} is not known."
             if choice.hierarchy is None:
                 yield f"{where}, there is no {'other ' * bool(choice.unknown)}hierarchy."
             elif len(choice.allowed) == 1:
@@ -323,34 +233,8 @@ class Scalability:
                     f"probability {format_number(choice.probability)}."
                 )
 
-    def to_dict(self) -> dict[str, object]:
-        """Return everything as tables and lists, see `plain`."""
-        return {
-            "size": self.data.size,
-            "scaling": self.data.scaling,
-            "performance": self.data.performance_title,
-            "rows": [line._asdict() for line in self.summaries],
-            "laws": {name: self._law_to_dict(name, law) for name, law in self.laws.items()},
-            "best": self.best._asdict() if self.best else None,
-            "best_sizes": {name: own._asdict() for name, own in self.best_sizes.items()},
-            "crossovers": [crossover._asdict() for crossover in self.crossovers],
-            "fronts": [point._asdict() for point in self.fronts],
-            "budget": [choice._asdict() for choice in self.choices],
-            "paragraph": self.paragraph,
-        }
 
-    def _law_to_dict(self, hierarchy: str, law: UniversalLaw) -> dict[str, object]:
-        largest = self.data.sizes(hierarchy)[-1]
-        return {
-            "contention": law.contention,
-            "coherency": law.coherency,
-            "describes_times": law.is_plausible,
-            "best_size": law.best_size_within(largest),
-            "sentence": _place(law, largest, self.data.size),
-        }
-
-
-def _place(law: UniversalLaw, largest: float, size: str) -> str:
+def place_of_maximum(law: UniversalLaw, largest: float, size: str) -> str:
     """Return where the throughput of a law has its maximum, in words."""
     value, low, high = map(float, law.best_size)
     if not law.is_plausible:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,34 +15,32 @@ from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..laws.scaling import decisions_to_criterion
 from ..laws.size_axis import SizeAxis
-from ..laws.universal import Scaling, Times
+from ..laws.universal import Scaling
 from ..results.analysis import estimate_of, mean_estimate
 from ..results.comparison import title_of, values_of
+from ..results.differences import BySeed
 from ..results.results import Results
 from ..results.statistics import Array, Estimate
-
-
-class Cost(NamedTuple):
-    """A cost of a hierarchy."""
-
-    number: str
-    """Name of the number of a trial; empty for decisions to a criterion."""
-    heading: str
-    """Heading in tables and figures."""
-
 
 ALL_TEAMS = "all teams"
 """Name of the only hierarchy of a study that varies nothing but the size."""
 DECISIONS = "decisions"
 """Name of the cost of training: decisions until the criterion is reached."""
-COSTS = {
-    "decision_ms": Cost("decision_median", "decision time [ms]"),
-    "messages": Cost("messages", "messages"),
-    "joint_actions": Cost("joint_actions", "joint actions"),
-    "compute_s": Cost("total", "computing time [s]"),
-    DECISIONS: Cost("", "decisions to criterion"),
+HEADINGS = {
+    "decision_ms": "decision time [ms]",
+    "messages": "messages",
+    "joint_actions": "joint actions",
+    "compute_s": "computing time [s]",
+    DECISIONS: "decisions to criterion",
 }
-"""Costs by name; messages and joint actions tried are those of one decision."""
+"""Headings of costs by name; messages and joint actions tried are those of one decision."""
+NUMBERS = {
+    "decision_ms": "decision_median",
+    "messages": "messages",
+    "joint_actions": "joint_actions",
+    "compute_s": "total",
+}
+"""Numbers of trials that are costs, by the name of the cost."""
 TIME = "steps"
 """Measure of the time of a task: decisions of an episode."""
 Place: TypeAlias = tuple[str, float]
@@ -67,7 +66,7 @@ class ScalabilityData:
     """Decisions of an episode; failed episodes count with the longest that is allowed. Missing
     where all episodes failed."""
     costs: Mapping[str, Cells]
-    """By the name of the cost, see `COSTS`."""
+    """By the name of the cost, see `HEADINGS`."""
     has_criterion: bool = False
     """Whether the decisions to a criterion are among the costs, as far as all seeds reach it."""
 
@@ -108,13 +107,16 @@ class ScalabilityData:
         columns = [cells[name, size] for cells in groups for name in names]
         return names, np.split(paired(columns), len(groups), axis=1)
 
-    def times_of(self, hierarchy: str) -> Times | None:
-        """Return the times of the seeds that ran at all sizes; None if fewer than two did."""
+    def times_of(self, hierarchy: str) -> pd.DataFrame | None:
+        """Return times by seed and size of the seeds that ran at all sizes; None of fewer than two.
+
+        There are no times, either, if those of a size are missing.
+        """
         sizes = self.sizes(hierarchy)
-        values = paired([self.times[hierarchy, n] for n in sizes if (hierarchy, n) in self.times])
-        if len(values) < 2 or values.shape[1] != len(sizes) or not (values > 0.0).all():
-            return None
-        return Times(np.array(sizes), values, self.scaling)
+        known = {n: self.times[hierarchy, n] for n in sizes if (hierarchy, n) in self.times}
+        times = pd.DataFrame(known).dropna()
+        is_known = len(known) == len(sizes) and len(times) > 1
+        return times if is_known and (times > 0.0).all(axis=None) else None
 
 
 def paired(columns: Sequence[pd.Series]) -> Array:
@@ -159,15 +161,14 @@ def collect(
     performances = _cells(values, places)
     if len({n for _, n in performances}) < 2:
         raise SpecError(f"size = {axis.key!r}: one size; scalability needs two or more")
-    costs = {
-        name: _measured(results, cost.number, None, places)
-        for name, cost in COSTS.items()
-        if cost.number
-    }
+    costs = {}
+    for cost, number in NUMBERS.items():
+        with suppress(SpecError):  # was not measured
+            costs[cost] = _cells(values_of(results, number)[1], places)
     if criterion is not None:
         reached = decisions_to_criterion(results, measure, criterion)
         counts = {c: own for c, (own, censored) in reached.items() if not censored.any()}
-        costs[DECISIONS] = _cells(counts, places)
+        costs |= {DECISIONS: _cells(counts, places)} if counts else {}
     return ScalabilityData(
         size=axis.name,
         scaling=scaling,
@@ -181,12 +182,12 @@ def collect(
             for condition, own in values.items()
         },
         times=_times(results, phase or None, places),
-        costs={name: cells for name, cells in costs.items() if cells},
+        costs=costs,
         has_criterion=criterion is not None,
     )
 
 
-def _cells(values: Mapping[str, object], places: Mapping[str, Place]) -> Cells:
+def _cells(values: Mapping[str, BySeed], places: Mapping[str, Place]) -> Cells:
     """Return values by hierarchy and size; refuse two conditions in one place."""
     cells: dict[Place, pd.Series] = {}
     for condition, own in values.items():
@@ -197,15 +198,6 @@ def _cells(values: Mapping[str, object], places: Mapping[str, Place]) -> Cells:
             )
         cells[places[condition]] = pd.Series(own)
     return cells
-
-
-def _measured(results: Results, name: str, phase: str | None, places: Mapping[str, Place]) -> Cells:
-    """Return a measure or number by hierarchy and size; nothing if it was not measured."""
-    try:
-        values = values_of(results, name, phase)[1]
-    except SpecError:
-        return {}
-    return _cells(values, places)
 
 
 def _times(results: Results, phase: str | None, places: Mapping[str, Place]) -> Cells:

@@ -1,4 +1,4 @@
-"""Pareto fronts of performance against a cost, and the best hierarchy within a budget.
+"""Best hierarchies and sizes: crossovers, Pareto fronts, and the best within a budget.
 
 The probability that a hierarchy is on the front, or is the best within the budget, is the share of
 bootstrap resamples of the shared seeds in which it is (Efron 1979).
@@ -7,49 +7,27 @@ bootstrap resamples of the shared seeds in which it is (Efron 1979).
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping
+from itertools import permutations
 
 import numpy as np
 
-from ...core.numerics import BoolArray, IntArray
+from ...core.numerics import BoolArray, IntArray, pd
 from ..errors import SpecError
-from ..results.statistics import Array
-from .data import ScalabilityData, cost_of
+from ..laws.inference import sign_change
+from ..results.statistics import Array, Estimate
+from .data import ScalabilityData, cost_of, paired
 
 RESAMPLES = 2000
 """Bootstrap resamples of seeds; probabilities are then known to 0.02."""
 ROUNDING = 1e-13
 """Relative difference of means that counts as rounding."""
+POINT = ["size", "cost", "hierarchy", "performance", "cost_value", "on_front", "probability"]
+"""Columns of `pareto_points`."""
+CHOICE = ["size", "hierarchy", "probability", "allowed", "unknown"]
+"""Columns of `best_within`."""
 LIMIT = re.compile(r"\s*([\w.]+)\s*<=\s*([0-9.eE+-]+)\s*")
 """One part of a budget, such as ``messages <= 50``."""
-
-
-class FrontPoint(NamedTuple):
-    """A hierarchy at one size with one cost."""
-
-    size: float
-    cost: str
-    hierarchy: str
-    performance: float
-    cost_value: float
-    on_front: bool
-    probability: float
-    """Probability that it is on the front."""
-
-
-class BudgetChoice(NamedTuple):
-    """The best hierarchy within a budget at one size."""
-
-    size: float
-    hierarchy: str | None
-    """None if no hierarchy is within the budget."""
-    probability: float
-    """Probability that this choice is the best one within the budget."""
-    allowed: tuple[str, ...]
-    """Hierarchies within the budget."""
-    unknown: tuple[str, ...] = ()
-    """Hierarchies of which a cost of the budget is not known; none of them is chosen."""
 
 
 def non_dominated(performance: Array, cost: Array) -> BoolArray:
@@ -71,26 +49,26 @@ def non_dominated(performance: Array, cost: Array) -> BoolArray:
     return np.logical_not(np.any(better & cheaper & strictly, axis=-1))
 
 
-def pareto_points(data: ScalabilityData) -> list[FrontPoint]:
-    """Return a point for every cost, size and hierarchy, with its place on the Pareto front.
+def pareto_points(data: ScalabilityData) -> pd.DataFrame:
+    """Return a row for every cost, size and hierarchy: mean performance and cost, place on front.
 
-    A size is left out if fewer than two hierarchies have the cost or if they share no seed.
+    A size is left out if fewer than two hierarchies have the cost or if they share no seed. The
+    column `on_front` says whether the hierarchy is on the Pareto front, and `probability` how
+    probable that is.
     """
-    points = []
+    parts = [pd.DataFrame(columns=POINT)]
     for name, cells in data.costs.items():
         for size in data.all_sizes:
             hierarchies, (values, costs) = data.paired_at(size, [cells])
             if len(hierarchies) < 2 or not len(values):
                 continue
-            drawn = _resample(len(values))
-            on_front = non_dominated(data.sign * values.mean(axis=0), costs.mean(axis=0))
-            resampled = non_dominated(
-                data.sign * values[drawn].mean(axis=1), costs[drawn].mean(axis=1)
-            ).mean(axis=0)
-            means = values.mean(axis=0).tolist(), costs.mean(axis=0).tolist()
-            places = zip(hierarchies, *means, on_front.tolist(), resampled.tolist(), strict=True)
-            points += [FrontPoint(size, name, *own) for own in places]
-    return points
+            better, drawn = data.sign * values, _resample(len(values))
+            on_front = non_dominated(better.mean(axis=0), costs.mean(axis=0))
+            resampled = non_dominated(better[drawn].mean(axis=1), costs[drawn].mean(axis=1))
+            means = values.mean(axis=0), costs.mean(axis=0)
+            cells_of = (size, name, hierarchies, *means, on_front, resampled.mean(axis=0))
+            parts.append(pd.DataFrame(dict(zip(POINT, cells_of, strict=True))))
+    return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
 def parse_budget(text: str) -> dict[str, float]:
@@ -121,8 +99,11 @@ def parse_budget(text: str) -> dict[str, float]:
     return limits
 
 
-def best_within(data: ScalabilityData, limits: Mapping[str, float]) -> list[BudgetChoice]:
-    """Return the best hierarchy within a budget at every size.
+def best_within(data: ScalabilityData, limits: Mapping[str, float]) -> pd.DataFrame:
+    """Return the best hierarchy within a budget at every size, None if none is within.
+
+    Further columns have the probability that it is the best one, the hierarchies within the
+    budget, and those of which a cost is not known, so that they are not chosen.
 
     Raises
     ------
@@ -130,30 +111,32 @@ def best_within(data: ScalabilityData, limits: Mapping[str, float]) -> list[Budg
         If a cost was not measured, or no hierarchy of any size is within the budget; one line.
     """
     cells = {name: cost_of(data, name) for name in limits}
-    choices = [_choose(data, size, limits) for size in data.all_sizes]
-    if all(choice.hierarchy is None for choice in choices):
+    choices = pd.DataFrame(
+        [_choose(data, size, limits) for size in data.all_sizes], columns=CHOICE, dtype=object
+    )
+    if choices["hierarchy"].isna().all():
         lowest = {name: min(float(own.mean()) for own in cells[name].values()) for name in limits}
         least = ", ".join(f"{name} >= {value:g}" for name, value in lowest.items())
         raise SpecError(f"budget: no hierarchy of any size is within it; least measured: {least}")
     return choices
 
 
-def _choose(data: ScalabilityData, size: float, limits: Mapping[str, float]) -> BudgetChoice:
+def _choose(data: ScalabilityData, size: float, limits: Mapping[str, float]) -> tuple[object, ...]:
+    """Return the row of `best_within` of a size."""
     here = data.at_size(size)
     hierarchies, (values, *each) = data.paired_at(size, [data.costs[cost] for cost in limits])
-    if not len(values):
-        return BudgetChoice(size, None, 0.0, (), here)
-    unknown = tuple(name for name in here if name not in hierarchies)
-    values = data.sign * values
+    unknown = tuple(name for name in here if name not in hierarchies or not len(values))
     costs = dict(zip(limits, each, strict=True))
-    (best,), (allowed,) = _best(values, costs, limits, np.arange(len(values))[None])
-    if not allowed.any():
-        return BudgetChoice(size, None, 0.0, (), unknown)
-    resampled, _ = _best(values, costs, limits, _resample(len(values)))
-    names = tuple(name for name, ok in zip(hierarchies, allowed, strict=True) if ok)
-    choice = int(best.argmax())
-    share = float(resampled[:, choice].mean())
-    return BudgetChoice(size, hierarchies[choice], share, names, unknown)
+    if len(values):
+        values = data.sign * values
+        (best,), (allowed,) = _best(values, costs, limits, np.arange(len(values))[None])
+        if allowed.any():
+            resampled, _ = _best(values, costs, limits, _resample(len(values)))
+            names = tuple(np.array(hierarchies, object)[allowed])
+            choice = int(best.argmax())
+            share = float(resampled[:, choice].mean())
+            return size, hierarchies[choice], share, names, unknown
+    return size, None, 0.0, (), unknown
 
 
 def _best(
@@ -188,9 +171,47 @@ def _resample(n_seeds: int) -> IntArray:
     return np.random.default_rng(0).integers(n_seeds, size=(RESAMPLES, n_seeds))
 
 
-def probability_of_best(columns: Sequence[Array]) -> Array:
-    """Return for each column of paired seeds the probability that its mean is the greatest."""
-    values = np.stack(columns, axis=1)
+def probability_of_best(values: Array) -> Array:
+    """Return for each column of ``(n_seeds, n)`` the probability that its mean is the greatest."""
     means = values[_resample(len(values))].mean(axis=1)
     shares: Array = _shares_of_greatest(means).mean(axis=0)
     return shares
+
+
+def best_sizes(data: ScalabilityData) -> dict[str, tuple[float, float]]:
+    """Return by hierarchy the measured size of best mean performance, and how probable it is."""
+    best = {}
+    for name in data.hierarchies:
+        sizes = data.sizes(name)
+        values = data.sign * paired([data.performances[name, n] for n in sizes])
+        if len(values) > 1:
+            k = int(values.mean(axis=0).argmax())
+            best[name] = sizes[k], float(probability_of_best(values)[k])
+    return best
+
+
+def best_hierarchies(data: ScalabilityData) -> tuple[tuple[str, ...], float] | None:
+    """Return the best at the largest size, or several that tie, and how probable that is.
+
+    None without two hierarchies and two seeds there.
+    """
+    names, (values,) = data.paired_at(data.all_sizes[-1], [])
+    if len(names) < 2 or len(values) < 2:
+        return None
+    values = data.sign * values
+    best = np.flatnonzero(are_greatest(values.mean(axis=0))).tolist()
+    probability = float(probability_of_best(values)[best].sum())
+    return tuple(names[k] for k in best), probability
+
+
+def crossovers(data: ScalabilityData) -> list[tuple[str, str, Estimate]]:
+    """Return better and worse hierarchy, and the size from which on, of all pairs that cross."""
+    changes = []
+    for better, worse in permutations(data.hierarchies, 2):
+        sizes = [n for n in data.sizes(better) if n in data.sizes(worse)]
+        values = paired([data.performances[name, n] for name in (better, worse) for n in sizes])
+        if len(sizes) > 1 and len(values) > 1:
+            differences = data.sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
+            size = sign_change(sizes, differences)
+            changes += [(better, worse, size)] if size is not None else []
+    return changes

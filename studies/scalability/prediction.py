@@ -7,7 +7,7 @@ the spec of the study and a hash, so that a later change of the file is found.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -29,7 +29,7 @@ from ..results.results import Results
 from ..results.statistics import Estimate
 from ..spec.tables import SpecTable, flat
 from ..store import durable
-from .data import ALL_TEAMS, COSTS, TIME
+from .data import ALL_TEAMS, HEADINGS, NUMBERS, TIME
 
 LEVEL = 0.9
 """Coverage of the intervals, for the mean of as many seeds as were fitted."""
@@ -47,6 +47,20 @@ class SizePrediction(NamedTuple):
     value: float
     low: float
     high: float
+
+    @property
+    def name(self) -> str:
+        """Hierarchy, size and measure."""
+        return f"{self.hierarchy}, {self.size:g}: {self.title}"
+
+    @property
+    def estimate(self) -> Estimate:
+        """The predicted mean with its interval."""
+        return Estimate(*map(np.asarray, (self.value, self.low, self.high)))
+
+    def holds(self, measured: Estimate) -> bool:
+        """Return whether the measured mean is within the interval."""
+        return self.low <= float(measured.value) <= self.high
 
 
 class PredictionFile(NamedTuple):
@@ -122,7 +136,7 @@ def predict(
         check_size("predict", n)
         if n in run:
             raise SpecError(f"predict = {n}: was run; name sizes that were not")
-    headings = {cost.number: cost.heading for cost in COSTS.values() if cost.number}
+    headings = {number: HEADINGS[cost] for cost, number in NUMBERS.items()}
     predictions: list[SizePrediction] = []
     remarks: list[str] = []
     seeds: list[int] = []
@@ -134,14 +148,14 @@ def predict(
                 raise
             continue  # was not measured
         title = headings.get(name, growth.title)
-        for fitted in growth.fits:
-            hierarchy = fitted.group or ALL_TEAMS
-            if fitted.law is None:
-                remarks.append(f"{hierarchy}: {title} is not predicted: {fitted.why}.")
+        for group, law in growth.fits.items():
+            hierarchy = group or ALL_TEAMS
+            if isinstance(law, str):
+                remarks.append(f"{hierarchy}: {title} is not predicted: {law}.")
                 continue
-            seeds.append(fitted.law.seeds)
+            seeds.append(law.seeds)
             for n in sizes:
-                ends = map(float, fitted.law.predict(n, LEVEL))
+                ends = map(float, law.predict(n, LEVEL))
                 predictions.append(SizePrediction(name, title, hierarchy, float(n), *ends))
     if not predictions:
         raise SpecError(f"predict: no measure has a law; {' '.join(remarks)}")
@@ -149,35 +163,13 @@ def predict(
     return PredictionFile(axis.key, min(seeds), plain, tuple(predictions)), tuple(remarks)
 
 
-class CheckedPrediction(NamedTuple):
-    """A prediction and what was measured later."""
-
-    prediction: SizePrediction
-    seeds: int
-    measured: Estimate
-
-    @property
-    def name(self) -> str:
-        """Hierarchy, size and measure."""
-        return f"{self.prediction.hierarchy}, {self.prediction.size:g}: {self.prediction.title}"
-
-    @property
-    def predicted(self) -> Estimate:
-        """The predicted mean with its interval."""
-        return Estimate(*map(np.asarray, self.prediction[-3:]))
-
-    @property
-    def has_held(self) -> bool:
-        """Whether the measured mean is within the interval."""
-        return self.prediction.low <= float(self.measured.value) <= self.prediction.high
-
-
 @dataclass(frozen=True, repr=False)
 class PredictionCheck(Report):
     """Predictions compared with later results."""
 
     file: PredictionFile
-    checked: tuple[CheckedPrediction, ...]
+    checked: tuple[tuple[SizePrediction, int, Estimate], ...]
+    """Predictions, and what was measured later: number of seeds and mean."""
 
     @property
     def table(self) -> SummaryTable:
@@ -185,8 +177,8 @@ class PredictionCheck(Report):
         heading = f"predicted ({LEVEL:.0%})"
         return tabulate(
             [
-                Summary(c.name, c.seeds, {heading: c.predicted, "measured": c.measured})
-                for c in self.checked
+                Summary(own.name, seeds, {heading: own.estimate, "measured": measured})
+                for own, seeds, measured in self.checked
             ]
         )
 
@@ -198,16 +190,19 @@ class PredictionCheck(Report):
     @property
     def notes(self) -> tuple[str, ...]:
         """The number of predictions that held, and those that did not."""
-        failed = [c for c in self.checked if not c.has_held]
+        failed = [(own, measured) for own, _, measured in self.checked if not own.holds(measured)]
         total = len(self.checked)
-        held = total - len(failed)
         expected = format_number(LEVEL * total)
-        lines = [f"{held} of {total} predictions held; {expected} are expected at {LEVEL:.0%}."]
-        for c in failed:
-            predicted = format_estimate(c.predicted)
-            measured = format_estimate(c.measured)
-            lines.append(f"Not held: {c.name}, predicted {predicted}, measured {measured}.")
-        if {c.seeds for c in self.checked} != {self.file.seeds}:
+        lines = [
+            f"{total - len(failed)} of {total} predictions held; {expected} are expected at "
+            f"{LEVEL:.0%}."
+        ]
+        for own, measured in failed:
+            both = (
+                f"predicted {format_estimate(own.estimate)}, measured {format_estimate(measured)}"
+            )
+            lines.append(f"Not held: {own.name}, {both}.")
+        if {seeds for _, seeds, _ in self.checked} != {self.file.seeds}:
             lines.append(
                 f"Intervals are for means of {self.file.seeds} seeds; other numbers of seeds were "
                 "measured."
@@ -216,15 +211,12 @@ class PredictionCheck(Report):
 
     def to_dict(self) -> dict[str, object]:
         """Return everything as plain data, which JSON can hold."""
-        return {
-            "sha256": self.file.sha256,
-            "checked": [
-                c.prediction._asdict()
-                | {"seeds": c.seeds, "measured": float(c.measured.value), "held": c.has_held}
-                for c in self.checked
-            ],
-            "sentences": list(self.notes),
-        }
+        rows = [
+            {"seeds": seeds, "measured": float(measured.value), "held": own.holds(measured)}
+            for own, seeds, measured in self.checked
+        ]
+        checked = [own._asdict() | row for (own, *_), row in zip(self.checked, rows, strict=True)]
+        return {"sha256": self.file.sha256, "checked": checked, "sentences": list(self.notes)}
 
 
 def check(file: PredictionFile, results: Results, spec: SpecTable) -> PredictionCheck:
@@ -242,13 +234,13 @@ def check(file: PredictionFile, results: Results, spec: SpecTable) -> Prediction
         for condition, (group, n) in SizeAxis.by(file.size, swept).places.items()
     }
     measured = {name: values_of(results, name) for name in {p.measure for p in file.predictions}}
-    checked: list[CheckedPrediction] = []
+    checked: list[tuple[SizePrediction, int, Estimate]] = []
     for prediction in file.predictions:
         measure, values, _ = measured[prediction.measure]
         condition = condition_at.get((prediction.hierarchy, prediction.size))
         if condition in values:
             own = pd.DataFrame(values[condition])
-            checked.append(CheckedPrediction(prediction, len(own), mean_estimate(measure, own)))
+            checked.append((prediction, len(own), mean_estimate(measure, own)))
     if not checked:
         predicted = ", ".join(f"{n:g}" for n in sorted({p.size for p in file.predictions}))
         raise SpecError(
@@ -259,8 +251,11 @@ def check(file: PredictionFile, results: Results, spec: SpecTable) -> Prediction
 
 
 def _check_spec(file: PredictionFile, spec: SpecTable) -> None:
-    tables = (dict(_fixed(own, file.size)) for own in (file.spec, json.loads(json.dumps(spec))))
-    predicted, measured = tables
+    free = (file.size, *FREE_KEYS)
+    predicted, measured = (
+        {key: value for key, value in flat(own) if key.removeprefix("sweep.") not in free}
+        for own in (file.spec, json.loads(json.dumps(spec)))
+    )
     for key in dict.fromkeys((*predicted, *measured)):
         if predicted.get(key) != measured.get(key):
             raise SpecError(
@@ -268,9 +263,3 @@ def _check_spec(file: PredictionFile, spec: SpecTable) -> None:
                 f"{predicted.get(key, 'absent')} in the prediction: specs must be equal except "
                 f"for {file.size} and seeds"
             )
-
-
-def _fixed(spec: Mapping[str, object], size: str) -> Iterator[tuple[str, object]]:
-    for key, value in flat(spec):
-        if key.removeprefix("sweep.") not in (size, *FREE_KEYS):
-            yield key, value

@@ -1,9 +1,9 @@
-"""Scalability of a study: table, laws, paragraph and figure."""
+"""Scalability of a study: tables, paragraph, figure and JSON."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, get_args
 
@@ -12,11 +12,12 @@ from ..laws.size_axis import SizeAxis
 from ..laws.universal import Scaling
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.analysis import Summary
 from ..results.notation import wrapped
 from ..results.results import Results
 from ..results.statistics import plain
 from ..spec.conditions import ConditionSettings
-from .analysis import Scalability
+from .analysis import Scalability, place_of_maximum
 from .data import collect
 
 if TYPE_CHECKING:
@@ -35,44 +36,81 @@ REMARK = (
 
 
 @dataclass(frozen=True, repr=False)
-class ScalabilityReport(Report):
+class ScalabilityReport(Scalability, Report):
     """Scalability of hierarchies and their costs; printed or shown by a notebook."""
 
-    analysis: Scalability
     remarks: tuple[str, ...] = ()
 
     @property
     def table(self) -> SummaryTable:
         """Performance, speed-up, efficiency, serial fraction and costs by hierarchy and size."""
-        return tabulate(self.analysis.summaries, remark=REMARK)
+        return tabulate(self.summaries, remark=REMARK)
 
     @property
     def laws(self) -> SummaryTable:
         """Contention, coherency and best size of the universal scalability law by hierarchy."""
-        return tabulate(self.analysis.law_summaries, remark=REMARK)
+        lines = []
+        for name, law in self.universal_laws.items():
+            estimates = {"contention": law.contention, "coherency": law.coherency}
+            best = law.best_size_within(self.data.sizes(name)[-1])
+            estimates |= {f"best number of {self.data.size}": best} if best is not None else {}
+            seeds = len(self.data.performances[name, self.data.sizes(name)[0]])
+            lines.append(Summary(name, seeds, estimates))
+        return tabulate(lines, remark=REMARK)
 
     @property
     def tables(self) -> tuple[SummaryTable, ...]:
         """The table of hierarchies and sizes, and that of laws if there are any."""
-        return (self.table, self.laws) if self.analysis.laws else (self.table,)
+        return (self.table, self.laws) if self.universal_laws else (self.table,)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """The findings as a paragraph, in lines, and remarks."""
-        return tuple(
-            line for text in (self.analysis.paragraph, *self.remarks) for line in wrapped(text)
-        )
-
-    @property
-    def json(self) -> str:
-        """Everything as JSON."""
-        return json.dumps(plain(self.analysis.to_dict() | {"remarks": self.remarks}), indent=1)
+        return tuple(line for text in (self.paragraph, *self.remarks) for line in wrapped(text))
 
     def figure(self) -> Figure:
         """Return four panels: performance, efficiency, a cost, and performance against the cost."""
         from .figure import draw  # matplotlib takes its time
 
-        return draw(self.analysis)
+        return draw(self)
+
+    @property
+    def json(self) -> str:
+        """Everything as JSON."""
+        data = self.data
+        best = self.best and (data.all_sizes[-1], *self.best)
+        content = {
+            "size": data.size,
+            "scaling": data.scaling,
+            "performance": data.performance_title,
+            "rows": [line._asdict() for line in self.summaries],
+            "laws": {name: self._law_to_dict(name) for name in self.universal_laws},
+            "best": best and dict(zip(("size", "hierarchies", "probability"), best, strict=True)),
+            "best_sizes": {
+                name: {"size": size, "probability": probability}
+                for name, (size, probability) in self.best_sizes.items()
+            },
+            "crossovers": [
+                {"better": better, "worse": worse, "size": size}
+                for better, worse, size in self.crossovers
+            ],
+            "fronts": self.fronts.to_dict("records"),
+            "budget": self.choices.to_dict("records"),
+            "paragraph": self.paragraph,
+            "remarks": self.remarks,
+        }
+        return json.dumps(plain(content), indent=1)
+
+    def _law_to_dict(self, hierarchy: str) -> dict[str, object]:
+        law = self.universal_laws[hierarchy]
+        largest = self.data.sizes(hierarchy)[-1]
+        return {
+            "contention": law.contention,
+            "coherency": law.coherency,
+            "describes_times": law.is_plausible,
+            "best_size": law.best_size_within(largest),
+            "sentence": place_of_maximum(law, largest, self.data.size),
+        }
 
 
 def analyze(
@@ -95,9 +133,9 @@ def analyze(
         size=size,
         criterion=criterion,
     )
-    analysis = Scalability(data, budget)
-    _ = analysis.choices  # a wrong budget is refused before anything is printed
-    return ScalabilityReport(analysis, () if scaling or by_scenario else (ASSUMED,))
+    report = ScalabilityReport(data, budget, () if scaling or by_scenario else (ASSUMED,))
+    _ = report.choices  # a wrong budget is refused before anything is printed
+    return report
 
 
 def _scaling_of(
@@ -105,11 +143,7 @@ def _scaling_of(
 ) -> Scaling | None:
     """Return whether the task grows with the team; None if the scenario does not say."""
     places = SizeAxis.of(results, size).places
-    sizes: dict[float, set[float | None]] = {}
-    for condition, own in settings.items():
-        if condition in places:
-            sizes.setdefault(places[condition][1], set()).add(own.scenario.task_size)
-    known: Sequence[float | None] = [part for each in sizes.values() for part in each]
+    known = {own.scenario.task_size for label, own in settings.items() if label in places}
     if not known or None in known:
         return None
-    return "weak" if len(set(known)) > 1 else "strong"
+    return "weak" if len(known) > 1 else "strong"

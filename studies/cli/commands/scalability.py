@@ -107,11 +107,11 @@ def scalability(
         print_data(report.json)
     elif form != "table":
         print_data(in_form(report.table, form))
-        if form in ("latex", "markdown") and report.analysis.laws:
+        if form in ("latex", "markdown") and report.universal_laws:
             print_data(f"\n{in_form(report.laws, form)}")
     else:
         print_table(report.table)
-        if report.analysis.laws:
+        if report.universal_laws:
             print_table(report.laws, ())
         print_text(*report.notes)
     return 0

@@ -72,14 +72,6 @@ def test_numbers_out_of_range_are_refused(tmp_path, capsys, options, complaint) 
     assert complaint in capsys.readouterr().err
 
 
-def test_a_plan_of_three_sizes_tells_which_exponents_can_be_told_apart() -> None:
-    spec = {"seeds": 12, "sweep": {"scenario.robots": [2, 4, 8], "topology": ["chain", "star"]}}
-    said = " ".join(str(planning.plan(spec, timed=False)).split())
-    assert "Exponents: 12 seeds of sizes 2 to 8 detect a difference of exponents of " in said
-    two = {**spec, "sweep": {"scenario.robots": [2, 4]}}
-    assert "Exponents" not in str(planning.plan(two, timed=False))
-
-
 PPO = {"kind": "ippo", "environments": 8, "rollout": 20, "epochs": 1, "hidden": [8]}
 EXPERIENCE = {"study": "experience", "seeds": 3, "steps": 10, "evaluation": 1}
 

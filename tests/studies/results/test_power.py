@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.laws import curves, fitting, samples
 from nested_agents.studies.results.analysis import verdict_lines
 from nested_agents.studies.results.differences import Difference, adjust
-from nested_agents.studies.results.notation import format_number
 from nested_agents.studies.results.permutation_tests import (
     LEVEL,
     independent_permutation,
@@ -21,7 +19,6 @@ from nested_agents.studies.results.power import (
     seeds_needed,
 )
 from nested_agents.studies.results.power_text import (
-    exponent_text,
     independent_power_lines,
     power_lines,
     power_text,
@@ -189,37 +186,6 @@ def test_power_far_out_where_scipy_has_no_number_is_that_of_simulated_studies() 
     share = (abs(t) > beyond).mean()
     assert power_of_t(freedom, shift, beyond) == pytest.approx(share, abs=0.005)
     assert 0.6 < share < 0.75
-
-
-def test_exponents_are_told_apart_by_more_seeds_or_larger_sizes() -> None:
-    said = " ".join(" ".join(exponent_text([2.0, 4.0, 8.0, 16.0], 20)).split())
-    # Logarithms of sizes lie log 2 apart: their squares about the mean sum up to 5 (log 2) ** 2.
-    deviation = 0.5 / (5.0**0.5 * np.log(2.0))
-    assert (
-        f"difference of exponents of {format_number(detectable(deviation, 20))} with power" in said
-    )
-    assert f"needs about {seeds_for(0.2, deviation)} seeds, or sizes up to 32." in said
-    few = " ".join(" ".join(exponent_text([2.0, 3.0, 4.0], 5, comparisons=3)).split())
-    assert few.startswith(
-        "Exponents: 5 seeds are too few for a significant difference; at least 7 are needed."
-    )
-
-
-def test_told_exponents_are_found_as_often_as_promised() -> None:
-    """Simulated laws whose exponents differ by what is detectable: four in five are found."""
-    sizes = np.array([2.0, 4.0, 8.0, 16.0])
-    deviation = 0.5 / (5.0**0.5 * np.log(2.0))
-    least = detectable(deviation, 20)
-    rng = np.random.default_rng(0)
-    times = 400
-    hits = 0
-    for _ in range(times):
-        logs = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5
-        others = 0.5 * rng.standard_normal((20, 4)) / 2.0**0.5 + least * np.log(sizes)
-        both = [samples.of_numbers(sizes, np.exp(own)) for own in (others, logs)]
-        pair = [fitting.fit(curves.POWER, sample, 2) for sample in both]
-        hits += fitting.compare(*pair).p < 0.05
-    assert 0.74 < hits / times < 0.88
 
 
 def test_differences_that_are_equal_except_for_rounding_have_no_power() -> None:

@@ -48,40 +48,42 @@ def test_a_point_is_beaten_only_if_another_is_no_worse_in_both_and_better_in_one
 
 
 def test_the_front_of_every_size(data):
-    on_front = {(p.size, p.hierarchy) for p in pareto_points(data) if p.on_front}
+    on_front = {(p.size, p.hierarchy) for p in pareto_points(data).itertuples() if p.on_front}
     assert on_front == {(2.0, "chain"), (2.0, "tree"), (2.0, "none"), (4.0, "tree"), (4.0, "none")}
-    assert {p.probability for p in pareto_points(data)} == {0.0, 1.0}
+    assert {p.probability for p in pareto_points(data).itertuples()} == {0.0, 1.0}
 
 
 def test_seeds_that_differ_make_the_front_uncertain(data):
     values = pd.Series(np.linspace(0.5, 1.1, 8), SEEDS)
     data.performances["chain", 4.0] = values
-    (chain,) = [p for p in pareto_points(data) if (p.size, p.hierarchy) == (4.0, "chain")]
+    (chain,) = [
+        p for p in pareto_points(data).itertuples() if (p.size, p.hierarchy) == (4.0, "chain")
+    ]
     assert 0.2 < chain.probability < 0.8
 
 
 def test_the_best_hierarchy_within_a_budget(data):
-    two, four = best_within(data, {"messages": 5.0})
+    two, four = best_within(data, {"messages": 5.0}).itertuples()
     assert (two.hierarchy, two.allowed, two.probability) == ("tree", ("tree", "none"), 1.0)
     assert (four.hierarchy, four.allowed) == ("none", ("none",))
 
 
 def test_a_hierarchy_of_unknown_cost_is_not_chosen_and_does_not_hide_the_others(data):
     del data.costs["messages"]["none", 4.0]
-    four = best_within(data, {"messages": 50.0})[1]
+    four = best_within(data, {"messages": 50.0}).iloc[1]
     assert (four.hierarchy, four.allowed) == ("tree", ("chain", "tree"))
     assert four.unknown == ("none",)
 
 
 def test_hierarchies_of_equal_performance_share_the_probability_of_being_the_best(data):
     data.performances["tree", 2.0] = data.performances["chain", 2.0]
-    two = best_within(data, {"messages": 50.0})[0]
+    two = best_within(data, {"messages": 50.0}).iloc[0]
     assert (two.hierarchy, two.probability) == ("chain", 0.5)
 
 
 def test_no_hierarchy_of_a_size_may_be_within_the_budget(data):
     del data.performances["none", 4.0]
-    assert [choice.hierarchy for choice in best_within(data, {"messages": 5.0})] == ["tree", None]
+    assert best_within(data, {"messages": 5.0})["hierarchy"].tolist() == ["tree", None]
 
 
 def test_seeds_are_paired_by_name_between_performance_and_cost(data):
@@ -90,8 +92,8 @@ def test_seeds_are_paired_by_name_between_performance_and_cost(data):
     for name in ("chain", "tree", "none"):
         data.performances[name, 4.0] = performance
         data.costs["messages"][name, 4.0] = cost
-    assert {p.performance for p in pareto_points(data) if p.size == 4.0} == {0.0}
-    assert {p.cost_value for p in pareto_points(data) if p.size == 4.0} == {9.0}
+    assert {p.performance for p in pareto_points(data).itertuples() if p.size == 4.0} == {0.0}
+    assert {p.cost_value for p in pareto_points(data).itertuples() if p.size == 4.0} == {9.0}
 
 
 def test_a_budget_below_everything_says_what_was_measured(data):
@@ -119,9 +121,9 @@ def test_a_cost_has_one_limit():
 
 def test_probabilities_of_being_best_add_up_to_one():
     rng = np.random.default_rng(0)
-    shares = probability_of_best([rng.normal(size=9) for _ in range(4)])
+    shares = probability_of_best(rng.normal(size=(9, 4)))
     assert shares.sum() == pytest.approx(1.0)
-    assert probability_of_best([np.ones(3), np.ones(3)]).tolist() == [0.5, 0.5]
+    assert probability_of_best(np.ones((3, 2))).tolist() == [0.5, 0.5]
 
 
 def test_only_seeds_that_all_have_are_paired():

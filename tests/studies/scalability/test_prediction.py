@@ -42,10 +42,10 @@ def test_predictions_hold_for_the_same_law_and_fail_for_another(tables):
     assert [p.size for p in file.predictions] == [16.0, 32.0]
     assert file.predictions[0].low < 4.0 < file.predictions[0].high
     same = check(file, load(tables / "large.csv").results, {})
-    assert all(own.has_held for own in same.checked)
+    assert all(own.holds(measured) for own, _, measured in same.checked)
     assert "2 of 2 predictions held" in same.notes[0]
     other = check(file, load(tables / "other.csv").results, {})
-    assert not any(own.has_held for own in other.checked)
+    assert not any(own.holds(measured) for own, _, measured in other.checked)
     assert "0 of 2 predictions held" in other.notes[0]
     assert "Not held: all teams, 16" in other.notes[1]
 

@@ -40,21 +40,20 @@ def load(path):
 
 
 def test_speed_up_and_law_of_published_results():
-    report = na.load(SCALING).scalability()
-    analysis = report.analysis
+    analysis = na.load(SCALING).scalability()
     assert analysis.data.scaling == "weak"  # boxes grow with the number of robots
     assert analysis.data.all_sizes == (2.0, 4.0, 8.0, 16.0)
     (own,) = analysis.speedups.values()
     steps = na.load(SCALING).results
     two, sixteen = (steps.means(size, "evaluation", "steps").mean() for size in ("2", "16"))
-    assert own[16.0].efficiency.value == pytest.approx(two / sixteen)
+    assert own[16.0]["efficiency"].value == pytest.approx(two / sixteen)
     assert set(analysis.data.costs) == {"decision_ms", "messages", "joint_actions", "compute_s"}
 
 
 def test_the_performance_is_that_of_the_table():
     study = na.load(RESULTS / "arms.json")  # many seeds without a failure: Wilson's intervals
     shown = study.table().lines[0]
-    line = study.scalability().analysis.summaries[0]
+    line = study.scalability().summaries[0]
     own = line.estimates["evaluation success"]
     assert tuple(own) == tuple(shown.estimates["evaluation success"])
     assert own.high == 1.0
@@ -62,29 +61,29 @@ def test_the_performance_is_that_of_the_table():
 
 
 def test_controls_that_never_succeed_have_no_speed_up():
-    analysis = na.load(RESULTS / "controls.json").scalability().analysis
+    analysis = na.load(RESULTS / "controls.json").scalability()
     assert set(analysis.speedups) == {"planner"}
 
 
 def test_arms_have_the_same_task_for_all_sizes():
-    assert na.load(RESULTS / "arms.json").scalability().analysis.data.scaling == "strong"
+    assert na.load(RESULTS / "arms.json").scalability().data.scaling == "strong"
 
 
 def test_the_scaling_may_be_named():
-    assert na.load(SCALING).scalability(scaling="strong").analysis.data.scaling == "strong"
+    assert na.load(SCALING).scalability(scaling="strong").data.scaling == "strong"
     with pytest.raises(na.SpecError, match="scaling = 'other': allowed are strong, weak"):
         na.load(SCALING).scalability(scaling="other")
 
 
 def test_the_paragraph_says_how_the_task_grows():
-    weak, strong = (na.load(SCALING).scalability(scaling=s).analysis for s in ("weak", "strong"))
+    weak, strong = (na.load(SCALING).scalability(scaling=s) for s in ("weak", "strong"))
     assert "grows with the team (weak scaling)" in weak.paragraph
     assert "the same for all sizes (strong scaling)" in strong.paragraph
 
 
 def test_numbers_of_whole_trials_leave_the_times_of_evaluation():
     study = na.load(SCALING)
-    usual, other = (study.scalability(m).analysis for m in (None, "messages"))
+    usual, other = (study.scalability(m) for m in (None, "messages"))
     assert other.data.performance.name == "messages"
     assert other.speedups.keys() == usual.speedups.keys()
 
@@ -101,32 +100,31 @@ def test_numbers_of_whole_trials_leave_the_times_of_evaluation():
 )
 def test_the_place_of_the_maximum_throughput_in_words(best, expected):
     law = SimpleNamespace(best_size=Estimate(*map(np.asarray, best)), is_plausible=True)
-    assert expected in analysis_module._place(law, 16.0, "robots")
+    assert expected in analysis_module.place_of_maximum(law, 16.0, "robots")
 
 
 def test_a_crossover_is_found_with_its_interval(table):
     report = load(table).scalability(size="agents")
-    (crossover,) = report.analysis.crossovers
-    assert (crossover.better, crossover.worse) == ("tree", "chain")
-    assert 4.0 <= crossover.size.low < crossover.size.value < crossover.size.high <= 8.0
-    assert "agents on, tree beats chain." in report.analysis.paragraph
+    ((better, worse, size),) = report.crossovers
+    assert (better, worse) == ("tree", "chain")
+    assert 4.0 <= size.low < size.value < size.high <= 8.0
+    assert "agents on, tree beats chain." in report.paragraph
 
 
 def test_the_size_is_what_changes_the_team_and_no_setting_of_the_learner():
     """A swept budget was taken for the size, because the single agent has no swept size."""
-    analysis = na.load(RESULTS / "equal-computing-boxes.json").scalability().analysis
+    analysis = na.load(RESULTS / "equal-computing-boxes.json").scalability()
     assert analysis.data.size == "robots"
     assert analysis.data.all_sizes == (2.0, 4.0, 8.0)
     assert analysis.data.sizes("single agent, budget=64") == (2.0,)
 
 
 def test_the_best_hierarchy_at_the_largest_size_comes_first():
-    analysis = na.load(RESULTS / "equal-computing-boxes.json").scalability().analysis
-    best = analysis.best
-    assert best.hierarchies == ("hierarchy, topology=chain, budget=1024",)
-    assert best.size == 8.0
-    assert best.probability > 0.95
-    assert best.hierarchies[0] in analysis.sentences[1]
+    analysis = na.load(RESULTS / "equal-computing-boxes.json").scalability()
+    (best,), probability = analysis.best
+    assert best == "hierarchy, topology=chain, budget=1024"
+    assert probability > 0.95
+    assert f"With 8 robots, {best} has the best mean" in analysis.paragraph
     assert len(analysis.named) == 3
 
 
@@ -160,12 +158,12 @@ def test_a_best_size_without_bound_is_said_in_words() -> None:
     """The throughput of a serial fraction has no maximum."""
     report = report_of(0.1)
     assert "inf" not in str(report.laws)
-    assert "more than 1" in report.analysis.paragraph
+    assert "more than 1" in report.paragraph
 
 
 def test_results_without_times_and_costs_have_no_speed_up(table):
     report = load(table).scalability(size="agents")
-    assert not report.analysis.speedups
+    assert not report.speedups
     assert "strong scaling is assumed" in " ".join(report.remarks)
 
 
@@ -186,18 +184,19 @@ def test_the_table_has_all_forms(form, capsys):
 
 
 def test_the_figure_fills_the_points_on_the_front():
-    analysis = na.load(RESULTS / "controls.json").scalability().analysis
+    analysis = na.load(RESULTS / "controls.json").scalability()
     cost, largest = next(iter(analysis.data.costs)), analysis.data.all_sizes[-1]
-    on_front = [p.on_front for p in analysis.fronts if (p.cost, p.size) == (cost, largest)]
+    points = analysis.fronts.itertuples()
+    on_front = [p.on_front for p in points if (p.cost, p.size) == (cost, largest)]
     assert len({*on_front}) == 2
     faces = [line.get_markerfacecolor() for line in draw(analysis).axes[3].lines]
     assert [face != "white" for face in faces] == on_front
 
 
 def test_the_axis_of_efficiencies_reaches_above_one_even_if_all_are_low():
-    analysis = report_of(0.9).analysis
+    analysis = report_of(0.9)
     (own,) = analysis.speedups.values()
-    assert own[16.0].efficiency.value < 0.2
+    assert own[16.0]["efficiency"].value < 0.2
     assert draw(analysis).axes[1].get_ylim()[1] >= MAX_EFFICIENCY
 
 
