@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.aggregates import Aggregates, aggregate
+from ..results.aggregates import aggregate
 from ..results.comparison import ComparisonTable
 from ..results.differences import Difference
 from ..store import durable
@@ -28,7 +29,7 @@ class Comparison(Report):
     remarks: tuple[str, ...] = ()
     """Remarks on the conditions, line by line."""
 
-    @cached_property
+    @property
     def table(self) -> SummaryTable:
         """Estimates and differences, in all forms."""
         return tabulate(self.analysis.table)
@@ -39,36 +40,27 @@ class Comparison(Report):
         return self.analysis.differences
 
     @property
-    def tables(self) -> tuple[SummaryTable]:
-        """The table of estimates."""
-        return (self.table,)
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """Verdicts, their power and remarks, line by line."""
         return (*self.analysis.notes, *self.remarks)
 
     @cached_property
-    def statistics(self) -> Aggregates:
-        """Interquartile means, probabilities of improvement and performance profiles.
+    def aggregated(self) -> tuple[SummaryTable, Sequence[str]]:
+        """Table of interquartile means and probabilities of improvement, and their meaning.
 
         Raises
         ------
         SpecError
             If no two conditions have two runs each, on common items if any.
         """
-        return aggregate(self.analysis)
-
-    @cached_property
-    def aggregated(self) -> SummaryTable:
-        """The table of `statistics`, in all forms."""
-        return tabulate(self.statistics.table)
+        lines, notes = aggregate(self.analysis)
+        return tabulate(lines), notes
 
     def figure(self) -> Figure:
-        """Return performance profiles, and the interquartile mean by episode of training."""
+        """Return performance profiles."""
         from ..presentation.figures import draw_profiles  # matplotlib takes its time
 
-        return draw_profiles(self.statistics)
+        return draw_profiles(self.analysis)
 
     def report(self, path: str | PathLike[str], sources: str = "") -> Path:
         """Write verdicts, table, statistics and figure as one self-contained HTML file.
@@ -92,7 +84,8 @@ class Comparison(Report):
         notes = [*self.notes]
         figures: dict[str, Figure] = {}
         if any(len(runs) > 1 for group in self.analysis.groups for runs in group.values.values()):
-            notes += ["", str(self.aggregated), "", *self.statistics.notes]
+            table, meanings = self.aggregated
+            notes += ["", str(table), "", *meanings]
             figures["runs"] = self.figure()
         title = self.analysis.title
         durable.write(file, comparison_page(title, sources, notes, self.table, figures).encode())

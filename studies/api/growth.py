@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 from numbers import Integral
 from typing import TYPE_CHECKING
 
@@ -30,15 +29,10 @@ class Growth(Report):
     analysis: scaling.ScalingLaw
     """The laws, group by group."""
 
-    @cached_property
+    @property
     def table(self) -> SummaryTable:
         """Exponents, what else a law has, and predictions, in all forms."""
         return tabulate(self.analysis.table)
-
-    @property
-    def tables(self) -> tuple[SummaryTable]:
-        """The table of laws."""
-        return (self.table,)
 
     @property
     def notes(self) -> tuple[str, ...]:

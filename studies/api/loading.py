@@ -14,10 +14,10 @@ from ...core.plugins.words import closest, expect, expect_each
 from ..errors import SpecError, refused
 from ..results import published
 from ..results.exported import is_exported, read_export
-from ..results.foreign_tables import ScoreColumns, parse_roles, read_scores
+from ..results.foreign_tables import columns_by_role, parse_roles, read_scores
 from ..results.joining import combine, join_parts
 from ..results.json_files import read_json
-from ..results.marl_eval import Runs, is_exported_by, join_runs, read_runs, results_of_runs
+from ..results.marl_eval import Runs, is_exported_by, read_runs, results_of_runs
 from ..results.results_file import Header
 from ..results.score_tables import SUFFIXES, ScoreTable, read_table, table_of
 from ..results.scores import Better, ScoreResults
@@ -30,7 +30,7 @@ from .data import Defaults, Place
 from .study import StudyResults
 
 Roles = Mapping[str, str | Sequence[str]]
-"""Column of a table by its role, see `ScoreColumns`."""
+"""Column of a table by its role, see `foreign_tables.ROLES`."""
 
 
 def load(*places: Place, columns: Sequence[str] = (), better: Better | None = None) -> StudyResults:
@@ -77,7 +77,7 @@ def load(*places: Place, columns: Sequence[str] = (), better: Better | None = No
 
 
 class RoleColumns(TypedDict, total=False):
-    """RoleColumns of a table of scores, by role; see `ScoreColumns`."""
+    """RoleColumns of a table of scores, by role; see `foreign_tables.ROLES`."""
 
     condition: str | Sequence[str]
     score: str | Sequence[str]
@@ -198,10 +198,10 @@ def _results_of(
     paths: Sequence[Path], opened: Sequence[Opened], roles: Roles, better: Better
 ) -> dict[Path, StudyResults]:
     """Return the results of what paths hold; runs of several files are put together."""
-    runs = {path: own for path, own in zip(paths, opened, strict=True) if isinstance(own, Runs)}
-    names = [name for own in runs.values() for name in own.names]
-    if len(runs) > 1 and len({*names}) == len(names):
-        runs = {next(iter(runs)): join_runs(list(runs.values()))}
+    runs = {path: own for path, own in zip(paths, opened, strict=True) if isinstance(own, dict)}
+    joined = {name: rows for own in runs.values() for name, rows in own.items()}
+    if len(runs) > 1 and len(joined) == sum(map(len, runs.values())):
+        runs = {next(iter(runs)): joined}
     loaded: dict[Path, StudyResults] = {}
     for path, own in zip(paths, opened, strict=True):
         if isinstance(own, StudyResults):
@@ -222,7 +222,7 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
             _check_better(better)
             measure = next(iter(map(str, roles.values())), None)
             return _of_scores(read_export(table, header), path, header, measure)
-        columns = ScoreColumns.of(roles, table.columns)
+        columns = columns_by_role(roles, table.columns)
         read = read_scores(table, columns, better)
     notes = header.remarks(path) if header and path and is_listed else ()
     return _of_scores(read._replace(notes=(*notes, *read.notes)), path)
@@ -294,8 +294,7 @@ def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResul
         if len(set(names)) < len(names):
             names = list(map(str, paths))
         results, labels = combine(
-            [(name, study.results) for name, study in zip(names, studies, strict=True)],
-            [study._settings for study in studies],
+            [(name, study.results) for name, study in zip(names, studies, strict=True)]
         )
         outline = studies[0].outline._replace(columns=results.columns)
         tables = {n: study.outline.table for n, study in zip(names, studies, strict=True)}

@@ -38,7 +38,7 @@ def measure_resilience(
     settings = {trial.condition: trial.settings for trial in kept.trials}
     with kept.spec.sources.active(), refused():
         teams = [
-            TeamLosses(condition, losable_team(own, fault), values[condition])
+            TeamLosses(condition, *losable_team(own, fault), values[condition])
             for condition, own in settings.items()
         ]
         able = tuple(own for own in teams if own.intact_mean > 0.0)
@@ -46,14 +46,13 @@ def measure_resilience(
             raise SpecError(f"{title} of all intact teams is 0 or below")
         n_lost = 1
         while open_teams := [
-            own for own in able if own.halving is None and n_lost < len(own.team.units)
+            own for own in able if own.halving is None and n_lost < len(own.units)
         ]:
             sets = {
-                own.condition: loss_sets(len(own.team.units), n_lost, max_sets)
-                for own in open_teams
+                own.condition: loss_sets(len(own.units), n_lost, max_sets) for own in open_teams
             }
             losses = {
-                own.condition: [[own.team.units[i] for i in units] for units in sets[own.condition]]
+                own.condition: [[own.units[i] for i in units] for units in sets[own.condition]]
                 for own in open_teams
             }
             evaluated = evaluate(_trials_with_losses(kept, fault, losses))

@@ -5,46 +5,30 @@ with the kept episodes. Either way, the explained team is the one that was measu
 """
 
 import re
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from ...core.agents.fuzzy import FuzzyAgents
-from ...core.agents.loop import world_seed
-from ...core.agents.team import Team
-from ...core.interface.abilities import PolicyMap, ShowsPolicy, horizon_of
+from ...core.interface.abilities import PolicyMap, ShowsPolicy
 from ...core.interface.experience import Observation
 from ...core.interface.prediction import Prediction
-from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
-from ...core.models.learned_predictor import LearnedPredictor
-from ...core.models.pose_model import PoseModel
-from ...core.numerics import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray, pd
 from ...core.values.rule_base import RuleBase
-from ...scenarios.checking.predictions import state_differences
 from ..errors import SpecError, refused
-from ..store.database import STAGE, columns
+from ..store.database import columns
 from ..store.durable import TEAM
 from ..store.store import Store
-from ..trials.session import EVALUATION_WORLDS, Session
+from ..trials.session import Session
 from ..trials.trial import Trial
 from .functions import Parts, decompose
 
-
-class WheelEffects(NamedTuple):
-    """Effects of the actuators of one body ``(3, w + 1)`` in its self-model."""
-
-    nominal: FloatArray
-    """Effects of its geometry, before training."""
-    learned: FloatArray
-    """Effects after training."""
-    deviations: FloatArray
-    """Standard deviations of the learned effects."""
+WheelEffects = tuple[FloatArray, FloatArray, FloatArray]
+"""Effects of the actuators of one body ``(3, w + 1)`` in its self-model: those of its geometry,
+those after training, and their standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +52,6 @@ class Explanation:
     none."""
     effects: tuple[WheelEffects, ...]
     """Effects by body as the self-model estimates them; empty without one."""
-    errors: pd.DataFrame | None
-    """Errors of the learned predictor, see `errors_of`; None without one."""
 
     @property
     def roles(self) -> dict[str, Parts]:
@@ -113,8 +95,7 @@ def explain(store: Store, trial: Trial) -> Explanation:
             variables=agents.space.variables,
             parts=tuple(taken[row] for row in agents.rows),
             policy=_policy(session),
-            effects=tuple(WheelEffects(*own) for own in effects),
-            errors=errors_of(session.team, session.scenario, trial.seed),
+            effects=tuple(effects),
         )
 
 
@@ -126,27 +107,22 @@ def _train(store: Store, session: Session) -> None:
     else:
         session.train(trial.episodes)
     measured = [measure.name for measure in store.measures()]
-    kept = _kept_rows(store, trial)
-    again = [row.flat(measured) for row in session.result().rows]
-    if kept != again:
-        pairs = zip(kept, again, strict=False)
-        other = next((ours for theirs, ours in pairs if theirs != ours), again[-1])
-        stage = "" if other[0] == "training" else f" of {other[0]}"
+    if _kept_rows(store, trial) != [row.flat(measured) for row in session.result().rows]:
         raise SpecError(
-            f"{store.directory}: training {trial.condition}, seed {trial.seed} again gives another "
-            f"episode {other[1]}{stage} than the one that is kept; this is not the software, or "
-            "not the kind of machine, that ran the study"
+            f"{store.directory}: training {trial.condition}, seed {trial.seed} again gives other "
+            "episodes than those that are kept; this is not the software, or not the kind of "
+            "machine, that ran the study"
         )
 
 
 def _kept_rows(store: Store, trial: Trial) -> list[tuple[object, ...]]:
     """Return the training episodes of a trial as they are kept, those of a curriculum first."""
     names, every = store.episodes()
-    at = [names.index(name) for name in columns(store.measures())]
-    condition, seed, phase = (names.index(name) for name in ("condition", "seed", "phase"))
-    own = (row for row in every if (row[condition], row[seed]) == (trial.condition, trial.seed))
-    trained = (row for row in own if row[phase] == "training" or str(row[phase]).startswith(STAGE))
-    return [tuple(row[i] for i in at) for row in trained]
+    rows = pd.DataFrame(list(every), columns=names, dtype=object)
+    own = rows[(rows["condition"] == trial.condition) & (rows["seed"] == trial.seed)]
+    is_training = own["phase"].str.startswith("training")
+    kept = own.loc[is_training, list(columns(store.measures()))]
+    return list(kept.itertuples(index=False, name=None))
 
 
 def _policy(session: Session) -> PolicyMap | str:
@@ -179,69 +155,3 @@ def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
     at = list(conditions).index(trial.condition)
     name = names[at] if names.count(names[at]) == 1 and names[at] else f"condition{at + 1}"
     return directory / "explain" / f"{name}-seed{trial.seed}"
-
-
-EPISODES = 10
-"""Worlds of the evaluation that are played."""
-DECISIONS = 30
-"""Predictions that are made in each."""
-
-
-def errors_of(team: Team, scenario: Scenario, seed: int) -> pd.DataFrame | None:
-    """Return root mean square errors by variable, or None if nothing is predicted by experience.
-
-    The team acts by what it has learned. Each decision is held for as long as predictions look
-    ahead. The given predictor is compared if it has the same horizon.
-
-    Parameters
-    ----------
-    team, scenario
-        Trained; both are modified.
-    seed
-        Of the trial.
-    """
-    agents = team.parts[0]
-    model = agents.model if isinstance(agents, FuzzyAgents) else None
-    if model is None or not isinstance(model.predictor, LearnedPredictor | PoseModel):
-        return None
-    horizon = model.predictor.horizon
-    errors: defaultdict[str, list[FloatArray]] = defaultdict(list)
-    for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
-        world = world_seed(seed, episode)
-        states = scenario.reset(world, episode)
-        team.reset(world, episode)
-        for _ in range(DECISIONS):
-            seen = team.observe(scenario, states)
-            joint = team.act(seen, explore=False).joint_action
-            learned = _states(model.predict(seen), joint)
-            guesses = {"learned": learned, "persistence": states}
-            given = scenario.predict() if horizon_of(scenario) == horizon else None
-            if given is not None:
-                guesses["given"] = _states(given, joint)
-            reached = _held(scenario, joint, horizon)
-            if reached is None:
-                break
-            states = reached
-            for name, guess in guesses.items():
-                errors[name].append(state_differences(scenario, states, guess))
-    index = [variable.name for variable in scenario.state_space.variables]
-    roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items()}
-    return pd.DataFrame(roots, index=index)
-
-
-def _held(scenario: Scenario, joint_action: IntArray, horizon: int) -> FloatArray | None:
-    """Return the states after a joint action and as long as it lasts; None if the episode ends."""
-    after = joint_action
-    if scenario.state_space.n_own:
-        after = np.full_like(joint_action, scenario.action_set.neutral)
-    for action in [joint_action, *[after] * (horizon - 1)]:
-        transition = scenario.step(action)
-        if transition.terminated or transition.truncated:
-            return None
-    return np.array(transition.states)
-
-
-def _states(prediction: Prediction, joint_action: IntArray) -> FloatArray:
-    """Return the states ``(n, d)`` that a joint action is predicted to lead to."""
-    each = range(len(joint_action))
-    return np.array([prediction.states(i, joint_action[None])[0] for i in each])

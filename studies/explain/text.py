@@ -58,14 +58,6 @@ def text(explained: Explanation) -> str:
     lines += [f"Not drawn: {policy}."] if isinstance(policy, str) else policy.lines()
     if explained.effects:
         lines += ["", "SELF-MODEL", "", *_self_model_lines(explained)]
-    if explained.errors is not None:
-        lines += ["", "PREDICTOR", ""]
-        lines += wrap(
-            "Root mean square errors of the learned predictor at its horizon, in units of each "
-            "variable. Persistence predicts that nothing changes.",
-            WIDTH,
-        )
-        lines += ["", explained.errors.to_string(float_format="%.3g")]
     return "\n".join(line.rstrip() for text in lines for line in text.splitlines() or [""]) + "\n"
 
 

@@ -8,7 +8,6 @@ is infinite if the denominator does not differ significantly from zero.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,14 +18,6 @@ LEVEL = 0.95
 """Confidence level of all intervals."""
 GRID_POINTS = 2001
 """Points at which an interpolated difference is tested."""
-
-
-class Quadratic(NamedTuple):
-    """Coefficients of ``square * r**2 - 2 * linear * r + constant``."""
-
-    square: float
-    linear: float
-    constant: float
 
 
 def student_quantile(n_seeds: int, level: float = LEVEL) -> float:
@@ -81,20 +72,17 @@ def ratio_interval(numerator: Array, denominator: Array, level: float = LEVEL) -
     if n_seeds < 2:
         return _estimate(value, math.nan, math.nan)
     covariance = np.cov(numerator, denominator) / n_seeds * student_quantile(n_seeds, level) ** 2
-    accepted = Quadratic(
-        bottom**2 - float(covariance[1, 1]),
-        top * bottom - float(covariance[0, 1]),
-        top**2 - float(covariance[0, 0]),
-    )
-    return _estimate(value, *_positive_solutions(accepted))
+    square = bottom**2 - float(covariance[1, 1])
+    linear = top * bottom - float(covariance[0, 1])
+    constant = top**2 - float(covariance[0, 0])
+    return _estimate(value, *_positive_solutions(square, linear, constant))
 
 
-def _positive_solutions(accepted: Quadratic) -> tuple[float, float]:
-    """Return the ends of the positive numbers at which a quadratic is at most zero.
+def _positive_solutions(square: float, linear: float, constant: float) -> tuple[float, float]:
+    """Return the ends of the r >= 0 with ``square * r**2 - 2 * linear * r + constant <= 0``.
 
     Where these are two regions, the ends enclose both.
     """
-    square, linear, constant = accepted
     discriminant = linear**2 - square * constant
     if square > 0.0:
         root = math.sqrt(max(discriminant, 0.0))

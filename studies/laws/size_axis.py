@@ -25,8 +25,9 @@ class SizeAxis(NamedTuple):
 
     Examples
     --------
-    >>> axis = SizeAxis.planned({"2, chain": {"scenario.robots": 2, "topology": "chain"},
-    ...                          "4, chain": {"scenario.robots": "4", "topology": "chain"}})
+    >>> columns = {"2, chain": {"scenario.robots": 2, "topology": "chain"},
+    ...            "4, chain": {"scenario.robots": "4", "topology": "chain"}}
+    >>> axis = SizeAxis.by("scenario.robots", columns)
     >>> axis.name, axis.places["4, chain"]
     ('robots', ('chain', 4.0))
     """
@@ -64,11 +65,6 @@ class SizeAxis(NamedTuple):
         is_counted = all("robots" in results.numbers(c) for c in results.conditions)
         counted = Sizes.of(results, results.conditions).keys if is_counted else ()
         return cls.by(_size_key(columns, size, counted), columns)
-
-    @classmethod
-    def planned(cls, columns: Columns) -> SizeAxis:
-        """Return the axis of a study before it runs; see `of`."""
-        return cls.by(_size_key(columns, None, ()), columns)
 
     @classmethod
     def by(cls, key: str, columns: Columns) -> SizeAxis:

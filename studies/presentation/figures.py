@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike
 
 from ...core.fonts import cover_text
 from ...core.numerics import FloatArray
-from ..results.aggregates import Aggregates
+from ..results.aggregates import profiles
 from ..results.analysis import Figures
+from ..results.comparison import ComparisonTable
 from ..results.differences import Difference
 from ..results.permutation_tests import LEVEL
 from ..results.statistics import Estimate, stack_estimates
@@ -176,12 +177,6 @@ def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_o
     """Add a legend of curves above the panels, with as many columns as fit."""
     handles = [handle(label, **look(i), lw=1.6, **look_of) for i, label in enumerate(labels)]
     add_legend(figure, handles, title, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
-
-
-def name_points(figure: Figure, labels: Sequence[str], title: str = "") -> None:
-    """Add a legend of the points of `draw_row` above the panels."""
-    looks = [{"color": look(i)["color"], "marker": marker(i), "ls": ""} for i in range(len(labels))]
-    add_legend(figure, [handle(n, **own) for n, own in zip(labels, looks, strict=True)], title)
 
 
 def save(
@@ -365,20 +360,14 @@ def count_seeds(counts: Iterable[int]) -> str:
     return f"{low} to {others[-1]}" if others else f"{low}"
 
 
-def draw_profiles(aggregates: Aggregates) -> Figure:
-    """Return the figure: share of runs above each score, interquartile mean by episode."""
-    names = [line.condition for line in aggregates.table]
+def draw_profiles(compared: ComparisonTable) -> Figure:
+    """Return the figure of performance profiles: the share of runs above each score."""
+    thresholds, by_condition = profiles(compared)
     with apply_style():
-        figure, axes = panels(1, 1 + bool(aggregates.curves), (7.2, 2.9))
-        profiles, *efficiency = axes[0]
-        for index, profile in enumerate(aggregates.profiles.values()):
-            draw_curve(profiles, aggregates.thresholds, profile, index)
-        profiles.set(xlabel=f"score: {aggregates.title}", title="share of runs that score more")
-        as_rates(profiles)
-        for own in efficiency:
-            for index, curve in enumerate(aggregates.curves.values()):
-                draw_curve(own, range(len(curve.value)), curve, index)
-            own.set(title="interquartile mean, training")
-            as_episodes(own)
-        name_curves(figure, names)
-    return spell_dollars(figure, names)
+        figure, axes = panels(1, 1, (4.5, 2.9))
+        for index, profile in enumerate(by_condition.values()):
+            draw_curve(axes[0, 0], thresholds, profile, index)
+        axes[0, 0].set(xlabel=f"score: {compared.title}", title="share of runs that score more")
+        as_rates(axes[0, 0])
+        name_curves(figure, [*by_condition])
+    return spell_dollars(figure, by_condition)

@@ -40,14 +40,13 @@ def headlines(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tu
     teams = [c for c, own in there.items() if own["learner"]["kind"] not in LEARN_NOTHING]
     if not 1 <= len(teams) <= MOST:
         return ()
-    sentences: list[str] = []
-    main = results.main.name
-    for team in teams:
-        control = control_of(team, there)
-        measured = [c for c in (team, control) if c and results.has(c, "evaluation", main)]
-        if len(measured) == 2:
-            sentences.append(_sentence(results, team, measured[1], there))
-    return tuple(sentences)
+    pairs = [(team, control_of(team, there)) for team in teams]
+    return tuple(
+        _sentence(results, team, control, there)
+        for team, control in pairs
+        if control is not None
+        and all(results.has(c, "evaluation", results.main.name) for c in (team, control))
+    )
 
 
 def below_random(results: Results, settings: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
@@ -56,24 +55,23 @@ def below_random(results: Results, settings: Mapping[str, Mapping[str, Any]]) ->
     The comparison uses the means of `Results.main`.
     """
     main = results.main
-    there = {c: settings[c] for c in results.of_phase("evaluation") if c in settings}
-    known = {c: own for c, own in there.items() if results.has(c, "evaluation", main.name)}
+    known = {
+        c: settings[c]
+        for c in results.of_phase("evaluation")
+        if c in settings and results.has(c, "evaluation", main.name)
+    }
     sign = -1.0 if main.better == "lower" else 1.0
-    below: dict[str, str] = {}
-    for condition, own in known.items():
-        control = random_control(condition, known)
-        if own["learner"]["kind"] not in LEARN_NOTHING and control is not None:
-            means = [results.means(c, "evaluation", main.name).mean() for c in (condition, control)]
-            if sign * (means[0] - means[1]) < 0.0:
-                below[condition] = control
+    means = {c: sign * results.means(c, "evaluation", main.name).mean() for c in known}
+    learners = [c for c, own in known.items() if own["learner"]["kind"] not in LEARN_NOTHING]
+    controls = {c: random_control(c, known) for c in learners}
+    below = {c: other for c, other in controls.items() if other and means[c] < means[other]}
     if not below:
         return ()
     shown = [f"{c} {_evaluated(results, c)}" for c in [*below][:MOST]]
-    if len(below) > MOST:
-        shown.append(f"{len(below) - MOST} more")
-    controls = [f"{c} {_evaluated(results, c)}" for c in dict.fromkeys(below.values())]
-    text = f"Below random actions in evaluation {main.heading}: {'; '.join(shown)}; "
-    return tuple(wrapped(f"{text}{'; '.join(controls)}. What to try: {TROUBLESHOOTING}"))
+    shown += [f"{len(below) - MOST} more"] * (len(below) > MOST)
+    shown += [f"{c} {_evaluated(results, c)}" for c in dict.fromkeys(below.values())]
+    text = f"Below random actions in evaluation {main.heading}: {'; '.join(shown)}. "
+    return tuple(wrapped(f"{text}What to try: {TROUBLESHOOTING}"))
 
 
 def _sentence(
@@ -83,13 +81,14 @@ def _sentence(
     compared = compare_conditions(results, results.main.name, "evaluation", reference=team)
     less = {d.condition: d for d in compared.differences}
     counted = count(len(results.seeds(team)), "seed")
-    is_learned = control in less and _is_below(less[control])
+    is_learned = control in less and _compared(less[control]) == "worse"
     verdict = f"learned ({counted})" if is_learned else f"is not seen to learn with {counted}"
     parts = [f"untrained ({control}) {_evaluated(results, control)}"]
     for other, own in settings.items():
         is_control = own["learner"]["kind"] in LEARN_NOTHING and other != control
         if is_control and other in less and not is_drawn(own):
-            parts.append(f"{other} {_evaluated(results, other)}, {_beside(less[other], counted)}")
+            word = _compared(less[other]) or f"difference not decided with {counted}"
+            parts.append(f"{other} {_evaluated(results, other)}, {word}")
     title = f"evaluation {results.main.heading}"
     return f"{team} {verdict}: {title} {_evaluated(results, team)}; {'; '.join(parts)}."
 
@@ -98,12 +97,8 @@ def _evaluated(results: Results, condition: str) -> str:
     return format_estimate(estimate_of(results, condition, "evaluation", results.main))
 
 
-def _is_below(difference: Difference) -> bool:
-    return difference.p < LEVEL and bool(difference.estimate.value < 0.0)
-
-
-def _beside(difference: Difference, counted: str) -> str:
-    """Return how a control differs from the team, in a few words."""
+def _compared(difference: Difference) -> str:
+    """Return whether a control does significantly worse or better than the team."""
     if difference.p >= LEVEL:
-        return f"difference not decided with {counted}"
+        return ""
     return "worse" if difference.estimate.value < 0.0 else "better"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import fill
@@ -40,12 +40,9 @@ def duration(seconds: float) -> str:
     """
     if seconds < 90:
         return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    if minutes < 60:
-        return f"{minutes} min"
-    hours, minutes = divmod(minutes, 60)
+    hours, minutes = divmod(round(seconds / 60), 60)
     if hours < 24:
-        return f"{hours} h {minutes} min"
+        return f"{hours} h {minutes} min" if hours else f"{minutes} min"
     return f"{hours // 24} d {hours % 24} h"
 
 
@@ -89,15 +86,13 @@ class Terminal(Observer):
         """Show progress, failures and remaining time."""
         if done:
             say(f"{done} of {total} trials were run before")
-        if done == total:
-            return
-        show = _follow_bar if sys.stderr.isatty() else _follow_lines
-        show(self._reacting(outcomes), total, done)
+        if done < total:
+            show = _follow_bar if sys.stderr.isatty() else _follow_lines
+            show(map(self._reacted, outcomes), total, done)
 
-    def _reacting(self, outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
-        for outcome in outcomes:
-            self._react(outcome)
-            yield outcome
+    def _reacted(self, outcome: Outcome) -> Outcome:
+        self._react(outcome)
+        return outcome
 
 
 def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:

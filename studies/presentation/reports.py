@@ -12,8 +12,13 @@ class Report(ABC):
 
     @property
     @abstractmethod
+    def table(self) -> SummaryTable:
+        """The main table."""
+
+    @property
     def tables(self) -> Sequence[SummaryTable]:
         """The tables in the order in which they are shown."""
+        return (self.table,)
 
     @property
     @abstractmethod

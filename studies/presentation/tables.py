@@ -103,33 +103,33 @@ def _shown(frame: pd.DataFrame, measures: dict[str, Measure]) -> pd.DataFrame:
     What equals success in every row, such as that the box stopped at the goal, is left out; so is
     success where nothing is one.
     """
-    names = [name for name in frame.columns if name in FORMATS or name in measures]
-    if SUCCESS.name in names:
-        same = {n for n in names if n in measures and frame[n].equals(frame[SUCCESS.name])}
-        names = [name for name in names if name == SUCCESS.name or name not in same]
+    shown = frame[[name for name in frame.columns if name in FORMATS or name in measures]]
+    if SUCCESS.name in shown:
+        same = [n for n in shown if n in measures and shown[n].equals(shown[SUCCESS.name])]
+        shown = shown.drop(columns=[name for name in same if name != SUCCESS.name])
         if main_measure([measures.get(SUCCESS.name, SUCCESS)]) == RETURN:
-            names.remove(SUCCESS.name)
-    headings = {name: measures[name].heading if name in measures else name for name in names}
+            shown = shown.drop(columns=SUCCESS.name)
     return pd.DataFrame(
-        {headings[name]: _cells(frame[[name]], measures.get(name)) for name in names}
+        {
+            measures[name].heading if name in measures else name: _cells(own, measures.get(name))
+            for name, own in shown.items()
+        }
     )
 
 
-def _cells(column: pd.DataFrame, measure: Measure | None) -> list[str]:
-    """Return the values of a column as text."""
-    values = [value for (value,) in rows_of(column)]
-    form = FORMATS[column.columns[0]] if measure is None else _format(measure, values)
-    return [MISSING if value is None else format(value, form) for value in values]
-
-
-def _format(measure: Measure, values: Sequence[Any]) -> str:
-    """Return how values of a measure are shown: with two or three decimals, unless large."""
-    if measure.is_rate:
-        return "d"
-    largest = max((abs(value) for value in values if value is not None), default=0.0)
-    if largest >= 1000.0:
-        return ".4g"
-    return ".2f" if measure.unit == "1" else ".3f"
+def _cells(column: pd.Series, measure: Measure | None) -> list[str]:
+    """Return the values of a column as text: two or three decimals for measures, unless large."""
+    if measure is None:
+        form = FORMATS[str(column.name)]
+    elif measure.is_rate:
+        form = "d"
+    elif column.abs().max() >= 1000.0:
+        form = ".4g"
+    else:
+        form = ".2f" if measure.unit == "1" else ".3f"
+    return [
+        MISSING if value is None else format(value, form) for (value,) in rows_of(column.to_frame())
+    ]
 
 
 def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[object]]) -> None:
@@ -227,20 +227,19 @@ class SummaryTable:
         if self.seeds == 1:
             return ["Values of 1 seed, without intervals."]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
+        usual = "Rates have Wilson intervals, others bootstrap intervals (too short if skewed)."
+        if any(line.seeds < FEW for line in self.lines):
+            usual = (
+                f"Fewer than {FEW} seeds: rates have Wilson intervals, others Student intervals."
+            )
         lines = [
             f"Means over {over} with 95% intervals.",
-            *wrapped(self.remark or self._usual_remark),
+            *wrapped(self.remark or usual),
         ]
         has_interval = self.cells.map(lambda text: " " in text).where(self.cells != "")
         if (has_interval.nunique() > 1).any():
             lines.append("Without an interval: one seed has the value, or all seeds have the same.")
         return lines
-
-    @property
-    def _usual_remark(self) -> str:
-        if all(line.seeds >= FEW for line in self.lines):
-            return "Rates have Wilson intervals, others bootstrap intervals (too short if skewed)."
-        return f"Fewer than {FEW} seeds: rates have Wilson intervals, others Student intervals."
 
     @property
     def meanings(self) -> dict[str, str]:

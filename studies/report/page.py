@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
 
 import jinja2
 import numpy as np
@@ -94,7 +93,8 @@ def page(directory: Path) -> str:
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),
-        **scalability,
+        scalability=scalability,
+        panels=pictures({"scalability": scalability.figure()}, "panels") if scalability else [],
         replays=packed,
         topologies=topologies(outline),
         hierarchies=drawn,
@@ -105,7 +105,7 @@ def page(directory: Path) -> str:
         results_version=results_version,
         css=_read_own("page.css"),
         js=_read_own("page.js"),
-        replay_js=Markup(packed.script),
+        replay_js=Markup(packed["script"]),
     )
 
 
@@ -117,16 +117,7 @@ def _notes(results: Results, analysis: Analysis) -> tuple[str, ...]:
     return (*missing_reference(results), *notes)
 
 
-def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> dict[str, object]:
-    """Return what the page's section on scalability shows; nothing for a study of one team size."""
-    report = _scalability_report(results, settings)
-    panels = pictures({"scalability": report.figure()}, "panels") if report else []
-    return {"scalability": report, "panels": panels}
-
-
-def _scalability_report(
-    results: Results, settings: Mapping[str, SpecTable]
-) -> ScalabilityReport | None:
+def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> ScalabilityReport | None:
     """Return the scalability report, or None if the study does not compare team sizes."""
     validated = {}
     with suppress(ValueError, KeyError, ImportError):  # the scaling is unknown then
@@ -204,23 +195,15 @@ def is_secondary(figure: tuple[str, object]) -> bool:
     return "success" not in figure[0] and "learning" not in figure[0]
 
 
-class Note(NamedTuple):
-    """A remark of a study without line breaks."""
-
-    indent: int
-    text: str
-
-
-def unfolded(lines: Iterable[str]) -> list[Note]:
-    """Join the continuations of lines, which are indented by two, to the lines they continue."""
-    notes: list[Note] = []
+def unfolded(lines: Iterable[str]) -> list[tuple[int, str]]:
+    """Return the indent and the text of remarks: lines indented by two continue the one before."""
+    notes: list[tuple[int, str]] = []
     for line in lines:
         indent = len(line) - len(line.lstrip())
-        is_further = notes and indent == notes[-1].indent + 2 and not notes[-1].text.endswith(":")
-        if is_further:
+        if notes and indent == notes[-1][0] + 2 and not notes[-1][1].endswith(":"):
             indent, text = notes.pop()
             line = f"{text} {line.lstrip()}"
-        notes.append(Note(indent, line.strip()))
+        notes.append((indent, line.strip()))
     return notes
 
 

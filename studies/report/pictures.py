@@ -5,8 +5,9 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import NamedTuple
+from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -30,33 +31,10 @@ TICK = 5.0
 """Width of the ticks of a vertical axis [pt]."""
 
 
-class Crop(NamedTuple):
-    """A part of a figure that narrow screens show on its own: parts side by side [pt]."""
-
-    width: float
-    height: float
-    parts: tuple[tuple[float, str], ...]
-    """Distance of each part from the left edge, and its view box in the figure."""
-
-
-class Picture(NamedTuple):
-    """A figure."""
-
-    name: str
-    """File name without suffix."""
-    svg: Markup
-    """SVG element with ids that differ from those of other figures in the page."""
-    pdf: str
-    """The same figure as PDF, in base64."""
-    prefix: str
-    """Prefix of the ids in the SVG element."""
-    panels: tuple[Crop, ...]
-    """The panels and the legend, which narrow screens stack; empty for one panel."""
-
-    @property
-    def title(self) -> str:
-        """Name with spaces."""
-        return self.name.replace("-", " ").replace("_", " ")
+Picture = dict[str, Any]
+"""A figure of a page: its ``name``, the file name without suffix; ``title``; ``svg``, an element
+with ids that begin with ``prefix``, so that they differ from those of other figures; ``pdf``, the
+same figure in base64; ``panels``, the panels and legends that narrow screens stack."""
 
 
 def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Picture]:
@@ -65,40 +43,44 @@ def pictures(figures: Mapping[str, Figure], prefix: str = "figure") -> list[Pict
     with apply_style():
         for number, (name, figure) in enumerate(figures.items(), 1):
             cover_text(figure)
-            svg = io.StringIO()
+            svg, pdf = io.StringIO(), io.BytesIO()
             figure.savefig(svg, format="svg", metadata={"Date": None})
-            name_space = f"{prefix}{number}-"
-            text = embed(svg.getvalue(), name_space)
-            pdf = io.BytesIO()
             figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
-            encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            drawings.append(Picture(name, Markup(text), encoded, name_space, crops_of(figure)))
+            drawings.append(
+                {
+                    "name": name,
+                    "title": name.replace("-", " ").replace("_", " "),
+                    "svg": Markup(embed(svg.getvalue(), f"{prefix}{number}-")),
+                    "pdf": base64.b64encode(pdf.getvalue()).decode("ascii"),
+                    "prefix": f"{prefix}{number}-",
+                    "panels": crops_of(figure),
+                }
+            )
     return drawings
 
 
-def crops_of(figure: Figure) -> tuple[Crop, ...]:
-    """Return the legends and the panels of a figure.
+def crops_of(figure: Figure) -> list[dict[str, object]]:
+    """Return the legends and the panels of a figure; nothing of a figure with one panel.
 
-    A panel that shares the vertical axis of the first panel in its row is shown next to that axis.
+    Each has its width and height, and its parts side by side [pt]: the distance of a part from the
+    left edge, and its view box in the figure. A panel that shares the vertical axis of the first
+    panel in its row is shown next to that axis.
     """
     panels = [axes for axes in figure.axes if axes.get_visible()]
     if len(panels) < 2:
-        return ()
+        return []
     crops = [_crop(figure, [legend.get_window_extent()]) for legend in figure.legends]
+    ticks, margin = (size * figure.dpi / 72.0 for size in (TICK, PANEL_MARGIN))
     for axes in panels:
-        own = _extent(axes).padded(PANEL_MARGIN * figure.dpi / 72.0)
-        row = [
-            sibling
-            for sibling in axes.get_shared_y_axes().get_siblings(axes)
-            if sibling.bbox.y0 == axes.bbox.y0
-        ]
+        own = _extent(axes).padded(margin)
+        siblings = axes.get_shared_y_axes().get_siblings(axes)
+        row = [sibling for sibling in siblings if sibling.bbox.y0 == axes.bbox.y0]
         first = min(row, key=lambda sibling: sibling.bbox.x0)
-        left = _extent(first).x0 - PANEL_MARGIN * figure.dpi / 72.0
-        ticks = TICK * figure.dpi / 72.0
+        left = _extent(first).x0 - margin
         axis = Bbox.from_extents(left, own.y0, first.bbox.x0 - ticks, own.y1)
         panel = Bbox.from_extents(axes.bbox.x0 - ticks, own.y0, own.x1, own.y1)
         crops.append(_crop(figure, [own] if first is axes else [axis, panel]))
-    return tuple(crops)
+    return crops
 
 
 def _extent(axes: Axes) -> BboxBase:
@@ -106,16 +88,15 @@ def _extent(axes: Axes) -> BboxBase:
     return axes.get_tightbbox() or axes.bbox
 
 
-def _crop(figure: Figure, boxes: Sequence[BboxBase]) -> Crop:
+def _crop(figure: Figure, boxes: Sequence[BboxBase]) -> dict[str, object]:
     """Return parts of a figure side by side; boxes have a common height [pixels]."""
     scale = 72.0 / figure.dpi
+    ends = np.cumsum([0.0, *(scale * box.width for box in boxes)]).round(1).tolist()
     parts = []
-    x = 0.0
-    for box in boxes:
+    for x, box in zip(ends, boxes, strict=False):
         places = (box.x0, figure.bbox.height - box.y1, box.width, box.height)
-        parts.append((round(x, 1), " ".join(f"{scale * value:.1f}" for value in places)))
-        x += scale * box.width
-    return Crop(round(x, 1), round(scale * boxes[0].height, 1), tuple(parts))
+        parts.append((x, " ".join(f"{scale * value:.1f}" for value in places)))
+    return {"width": ends[-1], "height": round(scale * boxes[0].height, 1), "parts": parts}
 
 
 def embed(svg: str, prefix: str) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 from ...core.interface.abilities import Animated
 from ...core.plugins.settings import ScenarioSettings
@@ -35,61 +35,22 @@ Json = dict[str, Any]
 """An object of JSON."""
 
 
-class EpisodePlayer(Protocol):
-    """A module that plays recordings on a canvas."""
-
-    SCRIPT: Path
-    """Path of the script that draws packed episodes."""
-
-    def scene_of(self, recording: Recording) -> Json:
-        """Return the fixed shapes of a recording; raise ValueError if it cannot be played."""
-
-    def pack(self, recording: Recording, scene: Json) -> Json:
-        """Return a recording as compact JSON with its `data` as text."""
-
-
-class Film(NamedTuple):
-    """The last training episode of a trial, drawn by its scenario."""
-
-    condition: str
-    seed: int
-    data: str
-    """A GIF in base64."""
-
-
-class Replays(NamedTuple):
-    """Recorded episodes of a page."""
-
-    scenes: list[Json]
-    """Fixed shapes of episodes."""
-    episodes: list[Json]
-    """Packed episodes; `scene` is an index into `scenes`."""
-    script: str
-    """Script that draws the episodes; empty without episodes."""
-    films: list[Film]
-    """Animations of other scenarios."""
-    missing: dict[str, Counter[str]]
-    """Numbers of finished trials that are not shown, by reason and condition."""
-
-    @property
-    def remarks(self) -> list[str]:
-        """A sentence for each reason why trials are not shown."""
-        sentences = []
-        for reason, trials in self.missing.items():
-            parts = [f"{name} ({count(number, 'seed')})" for name, number in trials.items()]
-            sentences.append(f"{reason}: {', '.join(parts)}.")
-        return sentences
-
-
 def replays(
     store: Store, results: Results, trials: Iterable[Planned], max_bytes: int = MAX_BYTES
-) -> Replays:
+) -> Json:
     """Pack the recordings of finished trials in order, up to a maximum size.
 
     Recordings without a player are shown as animations, one for each condition.
+
+    Returns
+    -------
+    dict
+        ``scenes``, the fixed shapes of episodes; packed ``episodes`` with the index of their
+        scene; ``script``, which draws them; ``films``, the animations of other scenarios; and
+        ``remarks``, a sentence for each reason why trials are not shown.
     """
     reached = _training_successes(results)
-    done = {(condition, seed) for condition, seed, _ in reached}
+    done = {key[:2] for key in reached}
     scenes = list[Json]()
     episodes = list[Json]()
     scripts = set[str]()
@@ -130,27 +91,37 @@ def replays(
             scripts.add(player.SCRIPT.read_text(encoding="utf-8"))
             size += len(episode["data"])
     films = _films(store, others, max_bytes - size)
-    filmed = {film.condition for film in films}
+    filmed = {film["condition"] for film in films}
     if not_drawn := Counter(t.condition for t in others if t.condition not in filmed):
         missing["Not shown because the scenario cannot draw it, or the page is full"] = not_drawn
-    return Replays(scenes, episodes, "".join(scripts), films, missing)
+    remarks = []
+    for reason, counts in missing.items():
+        parts = [f"{name} ({count(number, 'seed')})" for name, number in counts.items()]
+        remarks.append(f"{reason}: {', '.join(parts)}.")
+    return {
+        "scenes": scenes,
+        "episodes": episodes,
+        "script": "".join(scripts),
+        "films": films,
+        "remarks": remarks,
+    }
 
 
-def _films(store: Store, planned: Sequence[Planned], max_bytes: int) -> list[Film]:
+def _films(store: Store, planned: Sequence[Planned], max_bytes: int) -> list[Json]:
     """Return an animation for the first trial of each condition, up to a maximum size."""
-    films: list[Film] = []
-    if not planned:
-        return films
+    films = list[Json]()
     trials: dict[str, Trial] = {}
-    with suppress(SpecError):  # a study of another version
-        trials = {trial.identity: trial for trial in trials_of(spec_of(store))}
-    first = {trial.condition: trial for trial in reversed(planned)}
-    for condition in dict.fromkeys(trial.condition for trial in planned):
-        trial = first[condition]
-        gif = _gif(store, trials[trial.identity]) if trial.identity in trials else ""
-        if 0 < len(gif) <= max_bytes:
-            films.append(Film(condition, trial.seed, gif))
-            max_bytes -= len(gif)
+    if planned:
+        with suppress(SpecError):  # a study of another version
+            trials = {trial.identity: trial for trial in trials_of(spec_of(store))}
+    shown = set[str]()
+    for trial in planned:
+        if trial.condition not in shown:
+            shown.add(trial.condition)
+            gif = _gif(store, trials[trial.identity]) if trial.identity in trials else ""
+            if 0 < len(gif) <= max_bytes:
+                films.append({"condition": trial.condition, "seed": trial.seed, "data": gif})
+                max_bytes -= len(gif)
     return films
 
 
@@ -168,12 +139,12 @@ def _gif(store: Store, trial: Trial) -> str:
         return base64.b64encode(path.read_bytes()).decode("ascii")
 
 
-def _scene_of(recording: Recording) -> tuple[EpisodePlayer | None, Json]:
-    """Return the player of a recording and its scene; None without a player."""
+def _scene_of(recording: Recording) -> tuple[Any, Json]:
+    """Return the module that plays a recording, see above, and its scene; None without one."""
     models = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
     names = [model.player for model in models if issubclass(model, ScenarioSettings)]
     for name in dict.fromkeys(filter(None, names)):
-        player: EpisodePlayer = resolve_name(name)
+        player = resolve_name(name)
         with suppress(ValueError):
             return player, player.scene_of(recording)
     return None, {}

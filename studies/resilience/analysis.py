@@ -10,6 +10,7 @@ from math import comb
 
 import numpy as np
 
+from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ..results.analysis import Summary, mean_estimate, verdicts
@@ -24,7 +25,7 @@ from ..results.notation import format_estimate, format_number
 from ..results.permutation_tests import LEVEL
 from ..results.results import row_means
 from ..results.statistics import Estimate
-from .losses import LosableTeam
+from .losses import Position, positions
 
 HALF = 0.5
 """Share of the intact performance at which the number of losses stops growing."""
@@ -41,11 +42,21 @@ class TeamLosses:
     """Performance of the teams of one condition, intact and with losses."""
 
     condition: str
-    team: LosableTeam
+    hierarchy: Hierarchy
+    units: tuple[str, ...]
+    """Agents or actuators that can be lost."""
+    agents: tuple[int, ...]
+    """Index of the agent of each unit."""
     intact: pd.DataFrame
     """Performance by seed and episode."""
     lost: dict[tuple[int, ...], pd.DataFrame] = field(default_factory=dict)
     """The same by the indices of the lost units."""
+
+    @property
+    def positions(self) -> tuple[Position, ...]:
+        """Position of the agent of each unit in the hierarchy."""
+        of_agents = positions(self.hierarchy)
+        return tuple(of_agents[agent] for agent in self.agents)
 
     @property
     def intact_mean(self) -> float:
@@ -77,7 +88,7 @@ class TeamLosses:
 
     def name(self, units: Sequence[int]) -> str:
         """Return the names of lost units."""
-        return ", ".join(self.team.units[i] for i in units)
+        return ", ".join(self.units[i] for i in units)
 
 
 @dataclass(frozen=True)
@@ -155,7 +166,10 @@ class Resilience:
         title = self.loss_measure.title
         pairs: list[Pair] = [(own.condition, title, own.loss, first.loss) for own in others]
         (compared,) = differences({"": pairs}, self.loss_measure).values()
-        changes = {own.condition: self._single_change(own) for own in (first, *others)}
+        changes = {
+            own.condition: self._change(own, own.joined(own.by_number[1]))
+            for own in (first, *others)
+        }
         return tuple(
             d
             if not d.paired or np.ptp(d.sample) > 0.0
@@ -179,9 +193,9 @@ class Resilience:
     def _lines(self, own: TeamLosses) -> Iterator[Summary]:
         estimates = {self.title: mean_estimate(self.measure, own.intact)}
         yield Summary(f"{own.condition}, intact", len(own.intact), estimates)
-        positions = own.team.positions
+        positions = own.positions
         for n, sets in own.by_number.items():
-            of = comb(len(own.team.units), n)
+            of = comb(len(own.units), n)
             count = f"{len(sets)} sets" if len(sets) == of else f"{len(sets)} of {of} sets"
             if n > 1:
                 yield self._line(own, f"{n} lost, {count}", sets)
@@ -197,9 +211,6 @@ class Resilience:
             "change": self._change(own, lost),
         }
         return Summary(f"{own.condition}, {label}", len(lost), estimates)
-
-    def _single_change(self, own: TeamLosses) -> Estimate:
-        return self._change(own, own.joined(own.by_number[1]))
 
     def _change(self, own: TeamLosses, lost: pd.DataFrame) -> Estimate:
         with_losses, intact = row_means(lost), row_means(own.intact)
@@ -217,13 +228,13 @@ class Resilience:
         if worst is None:
             yield f"{own.condition}: one seed has no interval, so that nothing can be said."
             return
-        place = own.team.positions[own.team.units.index(worst.condition)]
+        place = own.positions[own.units.index(worst.condition)]
         yield (
             f"{own.condition}: {VERDICTS[self.verdict(own)]}. The worst "
             f"is that of {worst.condition} ({place}), which changes {self.title} by "
             f"{format_estimate(worst.estimate, signed=True)}."
         )
-        n = len(own.team.units)
+        n = len(own.units)
         halving = own.halving
         if halving is None:
             largest = max(own.by_number)
@@ -279,7 +290,7 @@ class Resilience:
         }
 
     def _team_to_dict(self, own: TeamLosses) -> dict[str, object]:
-        positions = dict(zip(own.team.units, own.team.positions, strict=True))
+        positions = dict(zip(own.units, own.positions, strict=True))
         return {
             "condition": own.condition,
             "seeds": len(own.intact),
@@ -294,13 +305,6 @@ class Resilience:
                     "p": d.p,
                 }
                 for d in self.single[own.condition]
-            ],
-            "sets": [
-                {
-                    "lost": [own.team.units[i] for i in units],
-                    "value": float(row_means(values).mean()),
-                }
-                for units, values in own.lost.items()
             ],
             "numbers": [
                 {"n_lost": n, "sets": len(sets), "change": self._change(own, own.joined(sets))}

@@ -23,14 +23,14 @@ def draw(analysis: Resilience) -> dict[str, Figure]:
 
 def _picture(analysis: Resilience, own: TeamLosses) -> Figure:
     intact = row_means(own.intact)
-    costs = [0.0] * len(own.team.hierarchy)
+    costs = [0.0] * len(own.hierarchy)
     for units in own.by_number[1]:
-        agent = own.team.agents[units[0]]
+        agent = own.agents[units[0]]
         cost = float((intact - row_means(own.lost[units])).mean())
         costs[agent] = max(costs[agent], cost)
     shares = [min(1.0, cost / own.intact_mean) for cost in costs]
     return picture(
-        own.team.hierarchy,
+        own.hierarchy,
         title=own.condition,
         fills=[to_hex(colormaps[COLORS](share)) for share in shares],
         note=f"red: {analysis.title} that the loss of the agent costs, from 0 (white) to "

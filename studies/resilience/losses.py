@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, islice
 from math import comb
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -19,30 +19,26 @@ from ..spec.conditions import ConditionSettings
 
 Position = Literal["root", "middle", "leaf", "alone"]
 """Place of an agent: without superiors, with both, without subordinates, or with neither."""
+POSITIONS: dict[tuple[bool, bool], Position] = {
+    (True, False): "root",
+    (True, True): "middle",
+    (False, True): "leaf",
+    (False, False): "alone",
+}
+"""Position of an agent that is a superior, and that is a subordinate."""
 AGENT_FAULTS = ("absent", "left", "lost")
 """Kinds of ``[[topology.failures]]`` by which an agent can be lost in any scenario."""
 
 
-class LosableTeam(NamedTuple):
-    """A team and its units that can be lost: agents or actuators."""
-
-    hierarchy: Hierarchy
-    units: tuple[str, ...]
-    agents: tuple[int, ...]
-    """Index of the agent of each unit."""
-
-    @property
-    def positions(self) -> tuple[Position, ...]:
-        """Position of the agent of each unit in the hierarchy."""
-        superiors = {superior for superior, _ in self.hierarchy.edges}
-        subordinates = {subordinate for _, subordinate in self.hierarchy.edges}
-        return tuple(_position(i in superiors, i in subordinates) for i in self.agents)
+def positions(hierarchy: Hierarchy) -> tuple[Position, ...]:
+    """Return the position of each agent in a hierarchy."""
+    superiors = {superior for superior, _ in hierarchy.edges}
+    subordinates = {subordinate for _, subordinate in hierarchy.edges}
+    return tuple(POSITIONS[i in superiors, i in subordinates] for i in range(len(hierarchy)))
 
 
-def _position(is_superior: bool, is_subordinate: bool) -> Position:
-    if is_superior:
-        return "middle" if is_subordinate else "root"
-    return "leaf" if is_subordinate else "alone"
+LosableTeam = tuple[Hierarchy, tuple[str, ...], tuple[int, ...]]
+"""A hierarchy, the units that can be lost, agents or actuators, and the agent of each unit."""
 
 
 def losable_team(settings: ConditionSettings, fault: str) -> LosableTeam:
@@ -67,7 +63,7 @@ def losable_team(settings: ConditionSettings, fault: str) -> LosableTeam:
         agents = tuple(agent_of[unit] for unit in range(len(units)))
     if len(units) < 2:
         raise SpecError(f"fault = {fault!r}: there is one agent only; losses need two or more")
-    return LosableTeam(hierarchy, units, agents)
+    return hierarchy, units, agents
 
 
 def with_loss(settings: ConditionSettings, fault: str, units: Sequence[str]) -> ConditionSettings:

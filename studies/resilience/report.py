@@ -28,11 +28,6 @@ class ResilienceReport(Report):
         return tabulate(self.analysis.summaries)
 
     @property
-    def tables(self) -> tuple[SummaryTable]:
-        """The table of losses."""
-        return (self.table,)
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """Explanation and findings, in lines."""
         texts = (*self.analysis.legend, *self.analysis.sentences)

@@ -5,9 +5,7 @@ performance profiles: the share of runs above every threshold. Tasks are the gro
 Runs are resampled within tasks; intervals are percentiles, as in the authors' library rliable.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,7 +13,7 @@ from ...core.numerics import stats
 from ..errors import SpecError
 from .analysis import Summary
 from .comparison import ComparisonTable
-from .statistics import Array, Estimate, blocks, probability_higher, stack_estimates
+from .statistics import Array, Estimate, blocks, probability_higher
 
 RESAMPLES = 2000
 THRESHOLDS = 51
@@ -56,99 +54,54 @@ def stratified_bootstrap(tasks: Tasks, statistic: Callable[[Tasks], Array]) -> E
     return Estimate(statistic(tasks), low, high)
 
 
-@dataclass(frozen=True)
-class Aggregates:
-    """Statistics of conditions over tasks."""
-
-    title: str
-    """Title of the measure."""
-    table: tuple[Summary, ...]
-    """A line for each condition, the reference first."""
-    thresholds: Array
-    """``(k,)`` scores."""
-    notes: tuple[str, ...]
-    """Meaning of the columns, in lines."""
-    scores: Mapping[str, Tasks] = field(repr=False)
-    """Runs of each task by condition."""
-    training: Mapping[str, Tasks] = field(repr=False)
-    """Scores ``(n_runs, n_episodes)`` of each task by condition; empty if not measured."""
-
-    @cached_property
-    def profiles(self) -> dict[str, Estimate]:
-        """Share of runs above each threshold ``(k,)`` by condition."""
-        return {name: _profile(own, self.thresholds) for name, own in self.scores.items()}
-
-    @cached_property
-    def curves(self) -> dict[str, Estimate]:
-        """Interquartile mean in each training episode by condition; empty if not measured."""
-        return {name: _curve(own) for name, own in self.training.items()}
-
-
-def aggregate(compared: ComparisonTable) -> Aggregates:
-    """Return the statistics of compared conditions; tasks are the groups of the comparison.
+def scores_of(compared: ComparisonTable) -> dict[str, Tasks]:
+    """Return the runs of each task by condition; tasks are the groups that have all conditions.
 
     Raises
     ------
     SpecError
         If no task has all conditions with two runs each.
     """
-    names = list(dict.fromkeys(name for group in compared.groups for name in group.values))
+    names = dict.fromkeys(name for group in compared.groups for name in group.values)
     groups = [g for g in compared.groups if all(len(g.values.get(n, ())) > 1 for n in names)]
     if len(names) < 2 or not groups:
         raise SpecError("statistics: no two conditions have two seeds each in a task of all")
-    scores = {name: [group.values[name] for group in groups] for name in names}
-    every = np.concatenate([runs for own in scores.values() for runs in own])
-    reference = names[0]
-    table = []
+    return {name: [group.values[name] for group in groups] for name in names}
+
+
+def aggregate(compared: ComparisonTable) -> tuple[list[Summary], tuple[str, str]]:
+    """Return a line of statistics for each condition, the reference first, and their meaning.
+
+    Raises
+    ------
+    SpecError
+        If no task has all conditions with two runs each.
+    """
+    scores = scores_of(compared)
+    reference, base = next(iter(scores.items()))
+    lines = []
     for name, own in scores.items():
         estimates = {"interquartile mean": stratified_bootstrap(own, interquartile_mean)}
         if name != reference:
-            both = (scores[reference], own)
-            worse, better = both[::-1] if compared.measure.better == "lower" else both
-            pairs = list(zip(better, worse, strict=True))
-            estimates["P(improvement)"] = probability_higher(pairs)
-        table.append(Summary(name, sum(map(len, own)), estimates))
-    measure = compared.measure.name
-    labels = {name: [group.members[name] for group in groups] for name in names}
-    is_trained = compared.phase and all(
-        compared.results.has(label, "training", measure) for own in labels.values() for label in own
-    )
-    training = {
-        name: [
-            compared.results.by_seed(label, "training", measure).dropna(axis=1).to_numpy()
-            for label in own
-        ]
-        for name, own in labels.items()
-        if is_trained
-    }
-    return Aggregates(
-        title=compared.title,
-        table=tuple(table),
-        thresholds=np.linspace(every.min(), every.max(), THRESHOLDS),
-        scores=scores,
-        training=training,
-        notes=(
-            f"{compared.title}. Intervals: percentiles, seeds resampled within "
-            f"{len(groups)} of {len(compared.groups)} tasks.",
-            f"P(improvement): probability that a seed does better than one of {reference}; ties "
-            "count half.",
-        ),
+            pair = (base, own) if compared.measure.better == "lower" else (own, base)
+            estimates["P(improvement)"] = probability_higher(list(zip(*pair, strict=True)))
+        lines.append(Summary(name, sum(map(len, own)), estimates))
+    return lines, (
+        f"{compared.title}. Intervals: percentiles, seeds resampled within "
+        f"{len(base)} of {len(compared.groups)} tasks.",
+        f"P(improvement): probability that a seed does better than one of {reference}; ties count "
+        "half.",
     )
 
 
-def _profile(tasks: Tasks, thresholds: Array) -> Estimate:
-    """Return the share of runs above each threshold, the mean over tasks."""
+def profiles(compared: ComparisonTable) -> tuple[Array, dict[str, Estimate]]:
+    """Return thresholds ``(k,)`` and by condition the share of runs above, the mean over tasks."""
+    scores = scores_of(compared)
+    every = np.concatenate([runs for own in scores.values() for runs in own])
+    thresholds = np.linspace(every.min(), every.max(), THRESHOLDS)
 
     def above(drawn: Tasks) -> Array:
         shares = [[(own > t).mean(axis=-1) for t in thresholds] for own in drawn]
         return np.moveaxis(np.mean(shares, axis=0), 0, -1)
 
-    return stratified_bootstrap(tasks, above)
-
-
-def _curve(tasks: Tasks) -> Estimate:
-    """Return the interquartile mean in each episode, of scores ``(n_runs, n_episodes)``."""
-    episodes = range(min(own.shape[1] for own in tasks))
-    return stack_estimates(
-        [stratified_bootstrap([own[:, k] for own in tasks], interquartile_mean) for k in episodes]
-    )
+    return thresholds, {name: stratified_bootstrap(own, above) for name, own in scores.items()}

@@ -173,19 +173,13 @@ def verdicts(
     counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
     tests = [text for paired, text in TESTS.items() if paired in {d.paired for d in compared}]
     lines += wrapped(f"p: {' and '.join(tests)}, adjusted over {counted} (Holm).")
-    if any(map(_seems_contradicted, compared)):
+    if any((d.estimate.low > 0.0 or d.estimate.high < 0.0) != (d.p < LEVEL) for d in compared):
         lines += wrapped(TWO_TESTS)
     title = title or " or ".join(dict.fromkeys(d.measure for d in compared))
     samples = [d.sample for d in compared if d.paired]
     independent = [d.values for d in compared if not d.paired]
     lines += power_lines(samples, title, of_rates=measure.is_rate)
     return lines + independent_power_lines(independent, len(compared), title)
-
-
-def _seems_contradicted(difference: Difference) -> bool:
-    """Return whether an interval and p seem to disagree about a difference."""
-    excludes_zero = bool(difference.estimate.low > 0.0 or difference.estimate.high < 0.0)
-    return excludes_zero != (difference.p < LEVEL)
 
 
 def judged(

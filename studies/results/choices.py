@@ -71,11 +71,11 @@ def _explain(
             end = key.rpartition(".")[2]
             return f"write `{key}` in backticks" + (f", or {end}" if names.get(end) == key else "")
     unknown = re.search("'(.+)'", str(error))
-    if isinstance(error, NameError) and unknown:
-        name = unknown[1]
-        several = ", ".join(f"`{key}`" for key in known if key.rpartition(".")[2] == name)
-        problem = f"no key is called {name!r}"
-        if several:
-            return f"{problem} alone, but {several}"
-        return f"{problem} ({nearest})" if (nearest := near(name, known)) else problem
-    return "must be such as robots == 8 and box == 'circle'"
+    if not isinstance(error, NameError) or not unknown:
+        return "must be such as robots == 8 and box == 'circle'"
+    name = unknown[1]
+    several = [f"`{key}`" for key in known if key.rpartition(".")[2] == name]
+    if several:
+        return f"no key is called {name!r} alone, but {', '.join(several)}"
+    nearest = near(name, known)
+    return f"no key is called {name!r}" + f" ({nearest})" * bool(nearest)

@@ -12,7 +12,7 @@ from ...core.interface.measures import RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
-from ..spec.tables import aliases, label, named
+from ..spec.tables import SpecTable, aliases, label, named
 from .analysis import NOTHING, Summary, identity_lines, mean_estimate, verdicts
 from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
 from .notation import MIN_LARGEST, wrapped
@@ -24,8 +24,8 @@ from .statistics import Array, Estimate, exactly
 
 DIFFERENCE_TITLES = {True: "difference", False: "difference (independent samples)"}
 """Headings of the column of differences, of paired and of independent runs."""
-Member = tuple[str, str]
-"""Name of a condition within its group, and its label."""
+Members = dict[str, str]
+"""Labels of the conditions of a group by their names within it."""
 
 
 class ComparisonGroup(NamedTuple):
@@ -152,17 +152,17 @@ def compare_conditions(
             f"{', '.join([*others, STEPS.name, RETURN.name])}"
         )
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
-    pairs: dict[str, list[Pair]] = {
-        setting: [
-            (name, measure, *_pair(values[c], values[members[0][1]], results.pairs_episodes))
-            for name, c in members[1:]
+    pairs: dict[str, list[Pair]] = {}
+    for setting, members in groups.items():
+        base, *others = members
+        pairs[setting] = [
+            (n, measure, *_pair(values[members[n]], values[members[base]], results.pairs_episodes))
+            for n in others
         ]
-        for setting, members in groups
-    }
     compared = differences(pairs, shown)
     compared_groups = [
         _group(results, setting, members, values, compared[setting], (shown, phase))
-        for setting, members in groups
+        for setting, members in groups.items()
     ]
     return ComparisonTable(shown, phase, tuple(compared_groups), results)
 
@@ -170,7 +170,7 @@ def compare_conditions(
 def _group(
     results: Results,
     setting: str,
-    members: list[Member],
+    members: Members,
     values: Mapping[str, pd.DataFrame],
     compared: tuple[Difference, ...],
     measured: tuple[Measure, str],
@@ -178,24 +178,26 @@ def _group(
     """Return the group of some conditions, the reference first."""
     measure, phase = measured
     by_name = {d.condition: d for d in compared}
-    base = values[members[0][1]]
+    reference = next(iter(members))
     lines = []
     left_out = []
-    for name, condition in members:
+    for name, condition in members.items():
         title = ", ".join(filter(None, (setting, name)))
-        estimates = {title_of(measure, phase): mean_estimate(measure, values[condition])}
+        own = values[condition]
+        estimates = {title_of(measure, phase): mean_estimate(measure, own)}
         if name in by_name:
             estimates |= _difference_columns(by_name[name], measure)
-            count = _left_out(results, values[condition], base) if by_name[name].paired else ""
-            left_out += [f"{members[0][0]} and {title}, {count}"] if count else []
-        lines.append(Summary(title, len(values[condition]), estimates))
+            if by_name[name].paired:
+                count = _left_out(results, own, values[members[reference]])
+                left_out += [f"{reference} and {title}, {count}"] if count else []
+        lines.append(Summary(title, len(own), estimates))
     return ComparisonGroup(
         setting=setting,
-        reference=members[0][0],
+        reference=reference,
         differences=compared,
         table=tuple(lines),
-        members=dict(members),
-        values={name: row_means(values[c]).to_numpy() for name, c in members},
+        members=members,
+        values={name: row_means(values[c]).to_numpy() for name, c in members.items()},
         left_out=tuple(left_out),
     )
 
@@ -305,9 +307,9 @@ def values_by_seed(
     has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
     recovery = RECOVERY if has_failed else {}
     measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
-    titled = [(title, m.name) for m in recovery.values() for title in (m.heading, m.title)]
-    titled += [(m.heading, m.name) for m in measures.values()]
-    name = dict(reversed(titled)).get(name, name)
+    titles = {m.heading: m.name for m in reversed([*measures.values()])}
+    titles |= {title: m.name for m in recovery.values() for title in (m.heading, m.title)}
+    name = titles.get(name, name)
     if name in recovery:
         measure, values = recovery_by_seed(results, name, phase or "training")
         return measure, {c: own.to_frame() for c, own in values.items()}, ""
@@ -349,29 +351,28 @@ def _trial_numbers(
 
 def _groups(
     conditions: list[str],
-    columns: Mapping[str, Mapping[str, object]],
+    columns: Mapping[str, SpecTable],
     by: str | None,
     reference: str | None,
-) -> list[tuple[str, list[Member]]]:
-    """Return the setting and the members of each group, the reference first."""
-    if by is None:
-        members = [(c, c) for c in conditions]
-        known = {c: aliases(c, columns[c]) for c in conditions}
-        return [("", _put_first(members, reference, known))] if members else []
+) -> dict[str, Members]:
+    """Return the members of each group by its setting, the reference first."""
     keys = dict.fromkeys(key for c in conditions for key in columns[c])
     key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
-    if key is None:
+    if by is not None and key is None:
         raise SpecError(f"by = {by!r}: {closest(by, keys)}")
-    groups: dict[str, list[Member]] = {}
+    groups: dict[str, Members] = {}
+    known = {}
     for c in conditions:
-        level = _level(key, columns[c][key])
-        rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
-        members = groups.setdefault(rest, [])
-        if level in (same := dict(members)):
-            raise SpecError(f"by = {by!r}: conditions {same[level]!r} and {c!r} differ in no key")
-        members.append((level, c))
-    known = {c: aliases(c, {key: columns[c][key]}) for c in conditions}
-    return [(setting, _put_first(members, reference, known)) for setting, members in groups.items()]
+        row = columns[c]
+        name, setting = c, ""
+        if key is not None:
+            name = _level(key, row[key])
+            setting = ", ".join(_level(k, v) for k, v in row.items() if k != key and v != "")
+        known[c] = aliases(c, row if key is None else {key: row[key]})
+        same = groups.setdefault(setting, {}).setdefault(name, c)
+        if same != c:
+            raise SpecError(f"by = {by!r}: conditions {same!r} and {c!r} differ in no key")
+    return {setting: _put_first(own, reference, known) for setting, own in groups.items()}
 
 
 def _level(key: str, value: object) -> str:
@@ -384,12 +385,12 @@ def _level(key: str, value: object) -> str:
 
 
 def _put_first(
-    members: list[Member], reference: str | None, known: Mapping[str, Collection[str]]
-) -> list[Member]:
+    members: Members, reference: str | None, known: Mapping[str, Collection[str]]
+) -> Members:
     """Return the members of a group, the reference first; `known` has the aliases of labels."""
     if reference is None:
         return members
-    first = named(reference, {name: known[c] for name, c in members})
+    first = named(reference, {name: known[c] for name, c in members.items()})
     if first is None:
-        raise SpecError(f"reference = {reference!r}: {closest(reference, dict(members))}")
-    return sorted(members, key=lambda member: member[0] != first)
+        raise SpecError(f"reference = {reference!r}: {closest(reference, members)}")
+    return {first: members[first]} | members

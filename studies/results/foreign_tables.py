@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 
@@ -44,58 +43,44 @@ UNPAIRED = (
 )
 
 
-class ScoreColumns(NamedTuple):
-    """The role of each column of a table."""
+ROLES = ("condition", "score", "seed", "item", "phase", "step")
+"""Roles of columns: the compared conditions, of which several columns are crossed; scores, each a
+measure; the name of the run; the question or task that was scored; the part of the data, such as
+training or test, which is never pooled; the step of training, of which the last is compared."""
+ScoreColumns = dict[str, tuple[str, ...]]
+"""Columns of a table by role; at most one of each role but condition and score."""
 
-    condition: tuple[str, ...] = ("condition",)
-    """Columns of the compared conditions; several columns are crossed."""
-    score: tuple[str, ...] = ("score",)
-    """Columns of scores, each a measure."""
-    seed: str | None = None
-    """Name of the run."""
-    item: str | None = None
-    """Name of the question or task that was scored."""
-    phase: str | None = None
-    """Part of the data, such as training or test; phases are never pooled."""
-    step: str | None = None
-    """Step of training at which the score was measured; the last one is compared."""
 
-    @classmethod
-    def of(
-        cls, given: Mapping[str, str | Sequence[str] | None], known: Sequence[str]
-    ) -> ScoreColumns:
-        """Return the roles that are given; other roles are those of columns of the same name.
+def columns_by_role(
+    given: Mapping[str, str | Sequence[str] | None], known: Sequence[str]
+) -> ScoreColumns:
+    """Return the columns of all roles: those that are given, or those called as the role.
 
-        Parameters
-        ----------
-        given
-            Column by role, or several columns of conditions and scores.
-        known
-            The columns of the table.
+    Parameters
+    ----------
+    given
+        Column by role, or several columns of conditions and scores.
+    known
+        The columns of the table.
 
-        Raises
-        ------
-        SpecError
-            If the table lacks a column, or a column has two roles.
-        """
-        several = {
-            role: _several(given.get(role) or role, known) for role in ("condition", "score")
-        }
-        single = {role: given.get(role) for role in cls._fields[2:]}
-        taken = {*chain(*several.values()), *single.values()}
-        for role in single:
-            if single[role] is None and role in known and role not in taken:
-                single[role] = role
-        wanted = [(role, name) for role, names in several.items() for name in names]
-        wanted += [(role, str(name)) for role, name in single.items() if name is not None]
-        names = [name for _, name in wanted]
-        for role, name in wanted:
+    Raises
+    ------
+    SpecError
+        If the table lacks a column, or a column has two roles.
+    """
+    columns = {role: _several(given.get(role) or role, known) for role in ROLES[:2]}
+    columns |= {role: (str(given[role]),) if given.get(role) else () for role in ROLES[2:]}
+    taken = {*chain(*columns.values())}
+    columns |= {r: (r,) for r in ROLES[2:] if not columns[r] and r in known and r not in taken}
+    names = [*chain(*columns.values())]
+    for role, own in columns.items():
+        for name in own:
             if name not in known:
                 hint = closest(name, known)
                 raise SpecError(f"columns: {role} = {name!r}: no such column; {hint}")
             if names.count(name) > 1:
                 raise SpecError(f"columns: {role} = {name!r}: is named twice")
-        return cls(**several, **single)  # type: ignore[arg-type]
+    return columns
 
 
 def parse_roles(pairs: Sequence[str]) -> dict[str, str]:
@@ -114,10 +99,9 @@ def parse_roles(pairs: Sequence[str]) -> dict[str, str]:
     given: dict[str, str] = {}
     for pair in (part for text in pairs for part in text.split(",")):
         role, _, column = pair.partition("=")
-        if role not in ScoreColumns._fields or not column or role in given:
+        if role not in ROLES or not column or role in given:
             raise SpecError(
-                f"columns = {pair!r}: must be ROLE=COLUMN, each role once: "
-                f"{', '.join(ScoreColumns._fields)}"
+                f"columns = {pair!r}: must be ROLE=COLUMN, each role once: {', '.join(ROLES)}"
             )
         given[role] = column
     return given
@@ -152,32 +136,33 @@ def read_scores(
     SpecError
         If a score is no finite number, a name is blank, a row stands twice, or nothing is left.
     """
-    titles = {_own_name(name): name for name in columns.score}
+    run, item, _, step = (next(iter(columns[role]), None) for role in ROLES[2:])
+    titles = {_own_name(name): name for name in columns["score"]}
     values = pd.DataFrame({name: table.numbers(title) for name, title in titles.items()})
     has_score = values.notna().any(axis=1).to_numpy()
     if not has_score.any():
-        raise SpecError(f"score = {'+'.join(columns.score)!r}: no row has one")
+        raise SpecError(f"score = {'+'.join(columns['score'])!r}: no row has one")
     notes = [
         f"{count} of {len(values)} rows have no {name!r}: left out"
         for name, count in values.isna().sum().items()
         if count
     ]
     table = table.take(np.flatnonzero(has_score))
-    levels = pd.DataFrame({name: table.names(name) for name in columns.condition})
+    levels = pd.DataFrame({name: table.names(name) for name in columns["condition"]})
     scores = values[has_score].reset_index(drop=True).assign(condition=_labels(levels))
     conditions = _conditions(scores["condition"], levels)
     scores = _named(table, columns, scores)
     for name in levels:
         notes += alike_note(str(name), levels[name])
-    for name in filter(None, (columns.seed, columns.item)):
+    for name in filter(None, (run, item)):
         notes += alike_note(name, table.text(name), are_runs=True)
-    has_items = columns.seed is not None and columns.item is not None
-    if columns.seed is None:
-        one_value = f"no column 'seed': a seed below is one value of {columns.item!r}"
-        notes.append(one_value if columns.item else UNPAIRED)
-    if columns.step is not None:
-        scores, aligned = _at_last_step(scores, list(titles), columns.step)
+    if run is None:
+        one_value = f"no column 'seed': a seed below is one value of {item!r}"
+        notes.append(one_value if item else UNPAIRED)
+    if step is not None:
+        scores, aligned = _at_last_step(scores, list(titles), step)
         notes += aligned
+    has_items = run is not None and item is not None
     scores["seed"] = whole_names(scores["seed"])
     scores["episode"] = whole_names(scores["episode"]) if has_items else 0
     measures = [measure_of(scores, name, title, better) for name, title in titles.items()]
@@ -196,8 +181,9 @@ def _named(table: ScoreTable, columns: ScoreColumns, scores: pd.DataFrame) -> pd
     scores, because the order of rows must not matter.
     """
     condition = scores["condition"]
+    seed, item, phase, step = (next(iter(columns[role]), None) for role in ROLES[2:])
+    run, item = (seed, item) if seed else (item, None)
     blank = pd.Series("", scores.index)
-    run, item = (columns.seed, columns.item) if columns.seed else (columns.item, None)
     runs = table.text(run) if run else blank
     items = table.text(item) if item else blank
     is_unnamed = runs == ""
@@ -207,25 +193,24 @@ def _named(table: ScoreTable, columns: ScoreColumns, scores: pd.DataFrame) -> pd
     if item is not None:
         table.refuse((items == "") & ~is_unnamed, item, "")
     named = scores.assign(
-        phase=table.names(columns.phase) if columns.phase else PHASE,
-        step=_steps(table, columns.step) if columns.step else 0.0,
+        phase=table.names(phase) if phase else PHASE,
+        step=_steps(table, step) if step else 0.0,
         seed=runs.mask(is_unnamed, UNNAMED + condition),
         episode=items,
     )
-    if columns.step is None and (items == "").all():
+    if step is None and (items == "").all():
         order = named[is_unnamed].sort_values(
-            ["condition", "phase", *map(_own_name, columns.score)]
+            ["condition", "phase", *map(_own_name, columns["score"])]
         )
         named.loc[order.index, "seed"] = [f"{UNNAMED}{k}" for k in range(len(order))]
-    roles = {
-        "condition": "+".join(columns.condition),
-        "phase": columns.phase,
-        "seed": run,
-        "episode": item,
-        "step": columns.step,
-    }
-    named_by = {"seed": columns.seed, "item": columns.item}
-    missing = [role for role, column in named_by.items() if column is None]
+    roles = dict(
+        zip(
+            ("condition", "phase", "seed", "episode", "step"),
+            ("+".join(columns["condition"]), phase, run, item, step),
+            strict=True,
+        )
+    )
+    missing = [role for role in ("seed", "item") if not columns[role]]
     hint = f"; name the column that differs: --columns {missing[0]}=COLUMN" if missing else ""
     refuse_repeated(table, named, roles, hint)
     return named

@@ -5,7 +5,7 @@ them. Sizes belong to one study if their specs differ in one number alone.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -13,7 +13,7 @@ from ...core.numerics import pd
 from ...core.plugins.words import show
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
-from ..spec.tables import SpecTable, flat, label
+from ..spec.tables import SpecTable, flat
 from ..trials.episodes import join_measures
 from .results import Results, StepLimits, assemble
 from .scores import name_key
@@ -142,29 +142,13 @@ DIRECTORY = "directory"
 """Column that tells from which study a condition came, where there are several."""
 
 
-def _distinguish(name: str, tables: Sequence[SpecTable]) -> list[str]:
-    """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
-
-    Examples
-    --------
-    >>> _distinguish("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
-    ['default, robots=2', 'default, robots=4']
-    """
-    own = [dict(flat(table)) for table in tables]
-    keys = dict.fromkeys(key for table in own for key in table)
-    other = [key for key in keys if len({repr(table.get(key)) for table in own}) > 1]
-    labels = [label({key: table.get(key, "") for key in other}, name) for table in own]
-    return labels if len(other) <= 2 and len(set(labels)) == len(labels) else []
-
-
 def combine(
-    studies: Sequence[tuple[str, Results]], settings: Sequence[SpecTable] = ()
+    studies: Sequence[tuple[str, Results]],
 ) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
 
-    Conditions with the same label are distinguished by their `settings`, where one or
-    two of these differ, else by the name of their study. Their columns tell it, too, as
-    `DIRECTORY`.
+    Conditions with the same label are distinguished by the name of their study, which is also in
+    their column `DIRECTORY`.
 
     Raises
     ------
@@ -177,12 +161,6 @@ def combine(
     labels = [
         {c: f"{c} ({name})" if c in several else c for c in part.columns} for name, part in studies
     ]
-    for condition in several if settings else ():
-        at = [i for i, part in enumerate(parts) if condition in part.columns]
-        apart = _distinguish(condition, [settings[i].get(condition, {}) for i in at])
-        if not times.keys() & set(apart):
-            for i, text in zip(at, apart, strict=False):
-                labels[i][condition] = text
     # Tables of scores with one condition column have no swept keys: their labels are compared.
     rows = [{c: row or {"name": c} for c, row in part.columns.items()} for part in parts]
     keys = dict.fromkeys(k for part in rows for row in part.values() for k in row)
@@ -197,18 +175,17 @@ def combine(
         swept = {k: label.map(lambda c, k=k: columns[c][k]) for k in (*keys, DIRECTORY)}
         return frame.assign(condition=label, **swept)
 
-    episodes = [rename(part.episodes, new) for part, new in zip(parts, labels, strict=True)]
-    trials = [rename(part.trials, new) for part, new in zip(parts, labels, strict=True)]
+    pairs = [*zip(parts, labels, strict=True)]
+    episodes = [rename(part.episodes, new) for part, new in pairs]
+    trials = [rename(part.trials, new) for part, new in pairs]
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
     measures = join_measures(part.measures for part in parts)
     results = assemble(episodes, trials, phases, columns, measures, usage)
-    limits = _loosest(part.step_limits for part in parts)
+    # The limits of all studies together are known if each study's are.
+    limits = (
+        None if None in own else max(own)
+        for own in zip(*(part.step_limits for part in parts), strict=True)
+    )
     pairs_episodes = any(part.pairs_episodes for part in parts)
-    return replace(results, step_limits=limits, pairs_episodes=pairs_episodes), labels
-
-
-def _loosest(limits: Iterable[StepLimits]) -> StepLimits:
-    """Return the limits of all studies together, which are known if each study's are."""
-    training, evaluation = zip(*limits, strict=True)
-    return StepLimits(*(None if None in own else max(own) for own in (training, evaluation)))
+    return replace(results, step_limits=StepLimits(*limits), pairs_episodes=pairs_episodes), labels

@@ -13,8 +13,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
@@ -22,6 +21,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from ...core.interface.measures import NO_SUCCESS, RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ..errors import SpecError
+from ..spec.tables import SpecTable
 from .json_files import Finite, Json, explain
 from .results import Results
 from .results_file import Header
@@ -45,12 +45,16 @@ STEP = re.compile(r"step_0*(\d+)", re.IGNORECASE | re.ASCII)
 """Key of a step."""
 ABSOLUTE = "absolute_metrics"
 STEP_COUNT = "step_count"
+TIME = "elapsed_time"
+"""Time of a step, which is not read."""
 SEED = "seed_"
 """Prefix of a run's name, before its seed."""
 STEPS = "steps"
 """Metric of exported studies: the length of an episode."""
 FINAL = -1
 """Step of absolute metrics, in long form."""
+IGNORED = -2
+"""Step of keys that are neither steps nor absolute metrics."""
 NEVER = "success: never in any run; returns are compared"
 
 
@@ -121,16 +125,10 @@ def _as_list(value: object) -> object:
 
 
 def _without_others(run: object) -> object:
-    """Return a run without its times; keys that are no steps have no metrics."""
+    """Return a run in which keys that are no steps have no metrics."""
     if not isinstance(run, dict):
         return run
-    return {key: {} if _is_ignored(key) else _without_time(own) for key, own in run.items()}
-
-
-def _without_time(metrics: object) -> object:
-    if not isinstance(metrics, dict):
-        return metrics
-    return {name: value for name, value in metrics.items() if name != "elapsed_time"}
+    return {key: {} if _is_ignored(key) else own for key, own in run.items()}
 
 
 def _is_ignored(key: str) -> bool:
@@ -146,23 +144,10 @@ RUN = ["task", "algorithm", "seed"]
 """Columns that name a run."""
 
 
-class Runs(NamedTuple):
-    """Measurements of runs of algorithms on tasks, from one file or several."""
-
-    frame: pd.DataFrame
-    """A row for each metric of each step of each run, with the columns `RUN`, ``measure``, ``step``
-    and ``values``, a list. The step of absolute metrics is `FINAL`."""
-    names: tuple[tuple[str, ...], ...]
-    """Task, algorithm and name of every run."""
-    ignored: frozenset[str]
-    """Keys that are neither steps nor absolute metrics."""
-
-
-def join_runs(parts: Sequence[Runs]) -> Runs:
-    """Return the runs of several files."""
-    frames, names, ignored = zip(*parts, strict=True)
-    whole = pd.concat(frames, ignore_index=True)
-    return Runs(whole, tuple(chain.from_iterable(names)), frozenset().union(*ignored))
+Row = tuple[str, float, list[float]]
+"""A metric of a run, its step, and the values that were measured there."""
+Runs = dict[tuple[str, str, str, str], list[Row]]
+"""Measurements of each run by environment, task, algorithm and name."""
 
 
 def read_runs(file: Json) -> Runs:
@@ -178,37 +163,33 @@ def read_runs(file: Json) -> Runs:
     except ValidationError as error:
         raise ValueError(explain(error, file)) from None
     runs = {
-        (environment, task, algorithm, name): run
+        (environment, task, algorithm, name): [
+            *_rows(run, f"{environment}.{task}.{algorithm}.{name}")
+        ]
         for environment, tasks in content.items()
         for task, algorithms in tasks.items()
         for algorithm, own in algorithms.items()
         for name, run in own.items()
     }
-    rows = [
-        (f"{e}/{t}", *names, *row)
-        for (e, t, *names), run in runs.items()
-        for row in _rows(run, ".".join((e, t, *names)))
-    ]
-    frame = pd.DataFrame(rows, columns=[*RUN, "measure", "step", "values"])
-    if not {*frame["measure"]} - {STEPS}:
+    if not any(values and metric != STEPS for own in runs.values() for metric, _, values in own):
         raise ValueError("no run has measured anything")
-    ignored = frozenset(key for run in runs.values() for key in run if _is_ignored(key))
-    return Runs(frame, tuple((f"{e}/{t}", *names) for e, t, *names in runs), ignored)
+    return runs
 
 
-def _rows(run: Mapping[str, Metrics], path: str) -> Iterator[tuple[str, float, list[float]]]:
+def _rows(run: Mapping[str, Metrics], path: str) -> Iterator[Row]:
     """Yield metric, step and values of the steps and the absolute metrics of a run."""
     keys: dict[str, str] = {}
     known = set[tuple[str, float]]()
     for key, metrics in run.items():
         if _is_ignored(key):
+            yield key, IGNORED, []
             continue
         match = STEP.fullmatch(key)
         if (first := keys.setdefault(match[1] if match else ABSOLUTE, key)) != key:
             raise ValueError(f"{path}.{key}: is {first}, too")
         step = _step_count(metrics, f"{path}.{key}") if match else FINAL
         for name, values in metrics.items():
-            if name == STEP_COUNT or not values:
+            if name in (STEP_COUNT, TIME) or not values:
                 continue
             metric = f"{name} (own)" if name in KEYS else name
             if (metric, step) in known:
@@ -231,7 +212,7 @@ def _step_count(metrics: Metrics, path: str) -> float:
 def is_exported_by(runs: Runs, header: Header) -> bool:
     """Return whether all runs are of conditions of a study."""
     known = {exported_name(condition) for condition in header.columns}
-    return {algorithm for _, algorithm, _ in runs.names} <= known
+    return {algorithm for _, _, algorithm, _ in runs} <= known
 
 
 def results_of_runs(runs: Runs, better: Better, header: Header | None) -> ScoreResults:
@@ -248,16 +229,23 @@ def results_of_runs(runs: Runs, better: Better, header: Header | None) -> ScoreR
     """
     labels = _labels(runs, header)
     columns = header.columns if header else _columns(labels)
-    frame = _labeled(runs.frame, labels)
-    n_empty = len(runs.names) - len(frame[RUN].drop_duplicates())
+    every = pd.DataFrame(
+        [(f"{e}/{t}", *names, *row) for (e, t, *names), own in runs.items() for row in own],
+        columns=[*RUN, "measure", "step", "values"],
+    )
+    ignored = every.loc[every["step"] == IGNORED, "measure"].unique()
+    frame = _labeled(every[every["step"] != IGNORED], labels)
+    n_empty = len(runs) - len(frame[RUN].drop_duplicates())
     notes = []
-    if runs.ignored:
-        notes.append(f"keys that are no steps are ignored: {', '.join(sorted(runs.ignored))}")
+    if len(ignored):
+        notes.append(f"keys that are no steps are ignored: {', '.join(sorted(ignored))}")
     if n_empty:
-        notes.append(f"{n_empty} of {len(runs.names)} runs have measured nothing: left out")
-    phases, chosen = _phases(frame, is_exported=header is not None and _counts_episodes(frame))
+        notes.append(f"{n_empty} of {len(runs)} runs have measured nothing: left out")
+    phases, chosen = _phases(frame, is_exported=header is not None)
     wide = pd.concat(phases).pivot(index=KEYS, columns="measure", values="value").reset_index()
-    wide["seed"] = whole_names(_without_prefix(wide["seed"]))
+    if wide["seed"].str.fullmatch(f"{SEED}({WHOLE.pattern})").all():
+        wide["seed"] = wide["seed"].str.removeprefix(SEED)
+    wide["seed"] = whole_names(wide["seed"])
     metrics = sorted(frame["measure"].unique())
     measures = header.measures if header else _measures(wide, metrics, better)
     if not header and measures[0] == NO_SUCCESS and SUCCESS.name in metrics:
@@ -270,10 +258,7 @@ def results_of_runs(runs: Runs, better: Better, header: Header | None) -> ScoreR
 
 def _labels(runs: Runs, header: Header | None) -> dict[tuple[str, str], str]:
     """Return the label of each algorithm on each task; the task is named if that is necessary."""
-    pairs = dict.fromkeys((task, algorithm) for task, algorithm, _ in runs.names)
-    exported = (
-        {exported_name(condition): condition for condition in header.columns} if header else {}
-    )
+    pairs = dict.fromkeys((f"{e}/{t}", algorithm) for e, t, algorithm, _ in runs)
     times = Counter(algorithm for _, algorithm in pairs)
     labels = {
         (task, algorithm): algorithm if times[algorithm] == 1 else f"{algorithm}, {task}"
@@ -281,13 +266,14 @@ def _labels(runs: Runs, header: Header | None) -> dict[tuple[str, str], str]:
     }
     if len({*labels.values()}) < len(labels):
         raise ValueError("two algorithms have the same name, if their task is named")
+    exported = {exported_name(c): c for c in header.columns} if header else {}
     return {pair: exported.get(label, label) for pair, label in labels.items()}
 
 
-def _columns(labels: Mapping[tuple[str, str], str]) -> dict[str, dict[str, object]]:
+def _columns(labels: Mapping[tuple[str, str], str]) -> dict[str, SpecTable]:
     several = len({task for task, _ in labels}) > 1
-    columns: dict[str, dict[str, object]] = {
-        label: {"algorithm": algorithm, **({"task": task} if several else {})}
+    columns = {
+        label: {"algorithm": algorithm} | ({"task": task} if several else {})
         for (task, algorithm), label in labels.items()
     }
     return {label: columns[label] for label in sort_labels(columns)}
@@ -306,11 +292,15 @@ def _labeled(frame: pd.DataFrame, labels: Mapping[tuple[str, str], str]) -> pd.D
 
 
 def _phases(frame: pd.DataFrame, *, is_exported: bool) -> tuple[list[pd.DataFrame], list[str]]:
-    """Return the scores of each phase, and notes on what is compared."""
+    """Return the scores of each phase, and notes on what is compared.
+
+    An export of this toolkit has an episode at each step. Of other files the absolute metrics are
+    evaluations, and series are compared at their last common step.
+    """
     is_final = frame["step"] == FINAL
     series = frame[~is_final].assign(phase="training")
     final = frame[is_final].assign(phase="evaluation")
-    if is_exported:  # by this toolkit: a step is an episode
+    if is_exported:
         return [series, _final(final)], []
     notes = []
     phases = []
@@ -320,8 +310,7 @@ def _phases(frame: pd.DataFrame, *, is_exported: bool) -> tuple[list[pd.DataFram
         rows, note = at_last_step(own, STEP_COUNT)
         if {*absolute["condition"]} == {*every["condition"]}:
             phases.append(_final(absolute))
-            note = f"{ABSOLUTE} are compared by default{_best_note(own, absolute)}"
-            note += left_out_note(every, absolute)
+            note = f"{ABSOLUTE} are compared by default{left_out_note(every, absolute)}"
             if len(rows):
                 note += f"; --phase '{LAST_STEP}' compares {STEP_COUNT} {rows['step'].iloc[0]:.0f}"
         if len(rows):
@@ -331,16 +320,6 @@ def _phases(frame: pd.DataFrame, *, is_exported: bool) -> tuple[list[pd.DataFram
     if not phases:
         raise ValueError("; ".join(joined_notes(notes)))
     return phases, joined_notes(notes)
-
-
-def _best_note(series: pd.DataFrame, absolute: pd.DataFrame) -> str:
-    """Return that absolute metrics are the best single values of runs, if they are."""
-    keys = ["condition", "seed"]
-    best = series["values"].map(max).groupby([series[k] for k in keys]).max()
-    many = series["values"].map(len).groupby([series[k] for k in keys]).sum()
-    own = absolute.set_index(keys)["values"]
-    is_best = (own.map(len) == 1).all() and own.map(max).equals(best.reindex(own.index))
-    return " (the best single value of each run)" if is_best and (many > 1).all() else ""
 
 
 def _final(absolute: pd.DataFrame) -> pd.DataFrame:
@@ -357,27 +336,10 @@ def _final(absolute: pd.DataFrame) -> pd.DataFrame:
 
 def _curves(series: pd.DataFrame, kept: pd.DataFrame) -> pd.DataFrame:
     """Return the curves of the runs that are kept, at the steps that all of a condition have."""
-    runs = pd.MultiIndex.from_frame(kept[["condition", "seed"]])
-    own = series[pd.MultiIndex.from_frame(series[["condition", "seed"]]).isin(runs)]
-    counts = own.groupby(["condition", "step"])["seed"].transform("nunique")
-    own = own[counts == own.groupby("condition")["seed"].transform("nunique")]
-    episode = own.groupby(["condition", "seed"])["step"].rank().astype(int) - 1
-    return own.assign(episode=episode)
-
-
-def _counts_episodes(frame: pd.DataFrame) -> bool:
-    """Return whether steps are episodes, so that step counts are cumulative lengths."""
-    series = frame[frame["step"] != FINAL]
-    lengths = series[series["measure"] == STEPS].sort_values("step")
-    ends = lengths["values"].map(sum).groupby([lengths[name] for name in RUN]).cumsum()
-    has_length = len(series.drop_duplicates([*RUN, "step"])) == len(lengths) > 0
-    return has_length and bool((ends == lengths["step"]).all())
-
-
-def _without_prefix(names: pd.Series) -> pd.Series:
-    """Return the names of runs without ``seed_``, if all have it before a whole number."""
-    is_seed = names.str.fullmatch(f"{SEED}({WHOLE.pattern})")
-    return names.str.removeprefix(SEED) if is_seed.all() else names
+    own = series.merge(kept[["condition", "seed"]])
+    of_condition = own.groupby("condition")["seed"].transform("nunique")
+    own = own[own.groupby(["condition", "step"])["seed"].transform("nunique") == of_condition]
+    return own.assign(episode=own.groupby(["condition", "seed"])["step"].rank().astype(int) - 1)
 
 
 def _measures(wide: pd.DataFrame, metrics: Sequence[str], better: Better) -> Sequence[Measure]:

@@ -180,7 +180,10 @@ def read_table(path: Path) -> ScoreTable:
                 path, engine="pyarrow", page_checksum_verification=True, **exact
             )
             return table_of(frame)
-        return _records_table(read_json(read_text(path), JsonNumber))
+        records = read_json(read_text(path), JsonNumber)
+        if not isinstance(records, list) or {*map(type, records)} != {dict}:
+            raise ValueError("must be a list of objects, [{...}, ...]")
+        return ScoreTable.of(records, range(len(records)))
     except ImportError:
         raise SpecError(f"{path}: Parquet is read by pyarrow: pip install pyarrow") from None
     except FileNotFoundError:
@@ -211,13 +214,6 @@ def _refuse_equal_names(names: Sequence[str]) -> None:
     for name in names:
         if name and names.count(name) > 1:
             raise SpecError(f"column {name!r}: stands twice")
-
-
-def _records_table(records: Json) -> ScoreTable:
-    """Return the table of a list of JSON objects, one for each row."""
-    if not isinstance(records, list) or not records or {*map(type, records)} != {dict}:
-        raise ValueError("must be a list of objects, [{...}, ...]")
-    return ScoreTable.of(records, range(len(records)))
 
 
 def _read_csv(text: str) -> ScoreTable:

@@ -165,6 +165,11 @@ def collect(
     for cost, number in NUMBERS.items():
         with suppress(SpecError):  # was not measured
             costs[cost] = _cells(values_of(results, number)[1], places)
+    times: Cells = {}
+    with suppress(SpecError):  # was not measured
+        steps, lengths, _ = values_of(results, TIME, phase or None)
+        limit = steps.bounds[1]  # where every episode reached it, nothing is known of the time
+        times = {p: own for p, own in _cells(lengths, places).items() if own.min() < limit}
     if criterion is not None:
         reached = decisions_to_criterion(results, measure, criterion)
         counts = {c: own for c, (own, censored) in reached.items() if not censored.any()}
@@ -181,7 +186,7 @@ def collect(
             else mean_estimate(shown_as, pd.DataFrame(own))
             for condition, own in values.items()
         },
-        times=_times(results, phase or None, places),
+        times=times,
         costs=costs,
         has_criterion=criterion is not None,
     )
@@ -198,16 +203,6 @@ def _cells(values: Mapping[str, BySeed], places: Mapping[str, Place]) -> Cells:
             )
         cells[places[condition]] = pd.Series(own)
     return cells
-
-
-def _times(results: Results, phase: str | None, places: Mapping[str, Place]) -> Cells:
-    """Return the times of the task, except where every episode reached the longest allowed."""
-    try:
-        steps, values, _ = values_of(results, TIME, phase)
-    except SpecError:
-        return {}
-    limit = steps.bounds[1]
-    return {place: own for place, own in _cells(values, places).items() if own.min() < limit}
 
 
 def cost_of(data: ScalabilityData, name: str) -> Cells:

@@ -183,11 +183,6 @@ class PredictionCheck(Report):
         )
 
     @property
-    def tables(self) -> tuple[SummaryTable]:
-        """The table of means."""
-        return (self.table,)
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """The number of predictions that held, and those that did not."""
         failed = [(own, measured) for own, _, measured in self.checked if not own.holds(measured)]

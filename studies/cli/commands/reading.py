@@ -151,13 +151,13 @@ def compare(
         say_remarks(loaded)
         print_data(in_form(comparison.table, form))
         if statistics:
-            print_data(f"\n{in_form(comparison.aggregated, form)}")
+            print_data(f"\n{in_form(comparison.aggregated[0], form)}")
         return 0
     print_table(comparison.table)
     print_text("", *comparison.notes)
     if statistics:
         print_text("")
-        print_table(comparison.aggregated, comparison.statistics.notes)
+        print_table(*comparison.aggregated)
     return 0
 
 

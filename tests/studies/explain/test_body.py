@@ -2,7 +2,6 @@ import numpy as np
 
 from nested_agents.core.models.self_model import SelfModel, SelfModelSettings
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
-from nested_agents.studies.explain.team import WheelEffects
 from nested_agents.studies.explain.text import changes
 
 FOUR = nominal_effect(ROBOTS["four-wheel"])
@@ -14,7 +13,7 @@ def bodies_of(*factors, deviation=0.01):
     changed = FOUR.copy()
     changed[:, :4] *= factors
     small = deviation * np.abs(FOUR)
-    return [WheelEffects(FOUR, changed, small), WheelEffects(FOUR, FOUR, small)]
+    return [(FOUR, changed, small), (FOUR, FOUR, small)]
 
 
 def test_changed_wheels_are_named_with_their_drive():
@@ -39,6 +38,6 @@ def test_a_seized_wheel_is_found_by_its_self_model():
     for _ in range(60):
         speeds = rng.uniform(-0.13, 0.13, size=4)
         model.observe(0, speeds, seized @ [*speeds, 1.0])
-    (line,) = changes([WheelEffects(FOUR, model.effects[0], model.deviations[0])], AGENTS[:4])
+    (line,) = changes([(FOUR, model.effects[0], model.deviations[0])], AGENTS[:4])
     assert line.startswith("robot1.rear-left: +0.0")
     assert "uncertain" not in line

@@ -16,11 +16,11 @@ def line():
 
 def test_a_figure_stands_in_a_page_and_can_be_taken_away():
     (picture,) = pictures({"one-line": line()})
-    assert (picture.name, picture.title) == ("one-line", "one line")
-    assert picture.svg.startswith('<svg id="figure1-"')
-    assert "a &lt; b &amp; c" in picture.svg
-    assert "<metadata>" not in picture.svg
-    assert picture.pdf.startswith("JVBERi")  # %PDF-
+    assert (picture["name"], picture["title"]) == ("one-line", "one line")
+    assert picture["svg"].startswith('<svg id="figure1-"')
+    assert "a &lt; b &amp; c" in picture["svg"]
+    assert "<metadata>" not in picture["svg"]
+    assert picture["pdf"].startswith("JVBERi")  # %PDF-
 
 
 def test_a_panel_on_its_own_keeps_the_axis_that_it_shares_with_its_row():
@@ -29,7 +29,7 @@ def test_a_panel_on_its_own_keeps_the_axis_that_it_shares_with_its_row():
     left.set_ylabel("success")
     spare.set_visible(False)
     (picture,) = pictures({"row": figure})
-    parts = [panel.parts for panel in picture.panels]
+    parts = [panel["parts"] for panel in picture["panels"]]
     assert [len(own) for own in parts] == [1, 2, 1], "the first of each row has its axis"
     x, _, width, _ = (float(value) for value in parts[1][0][1].split())
     label = left.yaxis.label.get_window_extent()
@@ -43,7 +43,7 @@ def test_equal_figures_are_equal_bytes():
 
 
 def test_ids_of_two_figures_do_not_clash():
-    found = [picture.svg for picture in pictures({"one": line(), "two": line()})]
+    found = [picture["svg"] for picture in pictures({"one": line(), "two": line()})]
     ids = [set(re.findall(r'\bid="([^"]+)"', svg)) for svg in found]
     assert not ids[0] & ids[1]
     used = set(re.findall(r'(?:url\(|href=")#([^")]+)', found[0]))

@@ -17,16 +17,16 @@ def read(directory, **options):
 
 def test_first_and_last_of_all_finished_trials(kept, tmp_path):
     found = read(kept(tmp_path, done=5))
-    assert len(found.episodes) == 10
-    assert [e["number"] for e in found.episodes[:2]] == [0, 3]
-    assert (len(found.scenes), found.remarks) == (1, [])
-    assert json.loads(json.dumps(found.episodes)) == found.episodes
+    assert len(found["episodes"]) == 10
+    assert [e["number"] for e in found["episodes"][:2]] == [0, 3]
+    assert (len(found["scenes"]), found["remarks"]) == (1, [])
+    assert json.loads(json.dumps(found["episodes"])) == found["episodes"]
 
 
 def test_what_there_is_no_room_for_is_named(kept, tmp_path):
     found = read(kept(tmp_path), max_bytes=1)
-    assert len(found.episodes) == 2
-    assert found.remarks == [
+    assert len(found["episodes"]) == 2
+    assert found["remarks"] == [
         "Left out to keep the page small: frozen (3 seeds), default (2 seeds)."
     ]
 
@@ -37,19 +37,22 @@ def test_damaged_and_foreign_recordings_are_named(kept, tmp_path, monkeypatch):
     first.write_bytes(b"PK")
     second.unlink()
     found = read(directory)
-    assert len(found.episodes) == 8
-    assert len(found.remarks) == 1
-    assert found.remarks[0].startswith("Not shown because the recording is missing or damaged: ")
+    assert len(found["episodes"]) == 8
+    assert len(found["remarks"]) == 1
+    assert found["remarks"][0].startswith("Not shown because the recording is missing or damaged: ")
     monkeypatch.delattr(BoxPushing, "animate")
     monkeypatch.setattr(player, "NEEDED", ("hat",))
-    assert "the scenario cannot draw it" in "".join(read(directory).remarks)
+    assert "the scenario cannot draw it" in "".join(read(directory)["remarks"])
 
 
 def test_what_the_canvas_cannot_play_is_drawn_by_its_scenario(kept, tmp_path, monkeypatch):
     directory = kept(tmp_path, steps=4)
     monkeypatch.setattr(player, "NEEDED", ("hat",))
     found = read(directory)
-    assert [(film.condition, film.seed) for film in found.films] == [("default", 0), ("frozen", 0)]
-    assert all(base64.b64decode(film.data).startswith(b"GIF89a") for film in found.films)
-    assert (found.episodes, found.remarks) == ([], [])
-    assert read(directory, max_bytes=len(found.films[0].data)).films == found.films[:1]
+    assert [(film["condition"], film["seed"]) for film in found["films"]] == [
+        ("default", 0),
+        ("frozen", 0),
+    ]
+    assert all(base64.b64decode(film["data"]).startswith(b"GIF89a") for film in found["films"])
+    assert (found["episodes"], found["remarks"]) == ([], [])
+    assert read(directory, max_bytes=len(found["films"][0]["data"]))["films"] == found["films"][:1]

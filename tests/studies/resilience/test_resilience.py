@@ -15,10 +15,10 @@ from nested_agents.core.numerics import pd
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.resilience.analysis import Resilience, TeamLosses
 from nested_agents.studies.resilience.losses import (
-    LosableTeam,
     actuator_faults,
     losable_team,
     loss_sets,
+    positions,
     with_loss,
 )
 from nested_agents.studies.resilience.report import ResilienceReport
@@ -36,7 +36,7 @@ scenario.kind = "kinematic-chain"
 scenario.joints = 3
 sweep.topology = ["chain", "independent"]
 """
-CHAIN = LosableTeam(Hierarchy("abc", [("a", "b"), ("b", "c")]), tuple("abc"), (0, 1, 2))
+CHAIN = (Hierarchy("abc", [("a", "b"), ("b", "c")]), tuple("abc"), (0, 1, 2))
 
 
 def settings_of(**table):
@@ -57,7 +57,7 @@ def rates(*by_seed):
 
 
 def resilience(lost, intact=(10,) * 12):
-    own = TeamLosses("chain", CHAIN, rates(*intact), {k: rates(*v) for k, v in lost.items()})
+    own = TeamLosses("chain", *CHAIN, rates(*intact), {k: rates(*v) for k, v in lost.items()})
     return Resilience("absent", SUCCESS, "success", 0.1, (own,)), own
 
 
@@ -70,17 +70,16 @@ def test_all_single_losses_and_some_of_many_larger_sets_are_chosen():
 
 
 def test_positions_are_those_in_the_hierarchy():
-    assert CHAIN.positions == ("root", "middle", "leaf")
-    alone = LosableTeam(Hierarchy("ab", []), tuple("ab"), (0, 1))
-    assert alone.positions == ("alone", "alone")
+    assert positions(CHAIN[0]) == ("root", "middle", "leaf")
+    assert positions(Hierarchy("ab", [])) == ("alone", "alone")
 
 
 def test_wheels_of_a_robot_belong_to_its_agent():
     settings = settings_of(agents="body")
-    assert losable_team(settings, "absent").units == ("robot1", "robot2")
-    wheels = losable_team(settings, "seized")
-    assert wheels.units == ("robot1.left", "robot1.right", "robot2.left", "robot2.right")
-    assert wheels.agents == (0, 0, 1, 1)
+    assert losable_team(settings, "absent")[1] == ("robot1", "robot2")
+    _, wheels, agents = losable_team(settings, "seized")
+    assert wheels == ("robot1.left", "robot1.right", "robot2.left", "robot2.right")
+    assert agents == (0, 0, 1, 1)
 
 
 def test_a_loss_is_added_to_the_failures_of_the_settings():
@@ -198,7 +197,7 @@ def test_seeds_are_paired_whatever_their_order():
 def compared(lost, reference_lost):
     """Compare an independent team with a chain, by successes of 10 after each single loss."""
     teams = [
-        TeamLosses(name, CHAIN, rates(*(10,) * 12), {(i,): rates(*own) for i in range(3)})
+        TeamLosses(name, *CHAIN, rates(*(10,) * 12), {(i,): rates(*own) for i in range(3)})
         for name, own in (("chain", reference_lost), ("independent", lost))
     ]
     return Resilience("absent", SUCCESS, "success", 0.1, tuple(teams))

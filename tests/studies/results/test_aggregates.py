@@ -7,10 +7,9 @@ from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import draw_profiles
 from nested_agents.studies.results.aggregates import (
-    _curve,
-    _profile,
     aggregate,
     interquartile_mean,
+    profiles,
     stratified_bootstrap,
 )
 from nested_agents.studies.results.comparison import compare_conditions
@@ -51,15 +50,6 @@ def test_estimates_and_intervals_are_those_of_rliable() -> None:
     better = probability_higher(list(zip(OWN, BASE, strict=True)))
     assert better.value == pytest.approx(0.59375)
     assert [better.low, better.high] == pytest.approx([0.45598958, 0.72337963], abs=0.02)
-    profile = _profile(list(OWN), np.array([0.0, 0.25, 0.5, 0.75]))
-    assert profile.value == pytest.approx([0.86111111, 0.77777778, 0.52777778, 0.22222222])
-    assert profile.low == pytest.approx([0.75, 0.63888889, 0.36111111, 0.11111111], abs=0.03)
-    assert profile.high == pytest.approx([0.94444444, 0.88888889, 0.69444444, 0.36111111], abs=0.03)
-    # Two episodes of training: sample efficiency.
-    curve = _curve([np.stack([own, base], axis=1) for own, base in zip(OWN, BASE, strict=True)])
-    assert curve.value == pytest.approx([0.55, 0.39444444])
-    assert curve.low == pytest.approx([0.41111111, 0.28888889], abs=0.02)
-    assert curve.high == pytest.approx([0.66111111, 0.52222222], abs=0.02)
 
 
 TIME = Measure("time", "time", "s", better="lower")
@@ -90,20 +80,22 @@ def results(seeds=3):
 
 
 def test_groups_of_a_comparison_are_tasks() -> None:
-    found = aggregate(compare_conditions(results(), by="kind"))
-    assert [(line.condition, line.seeds) for line in found.table] == [("a", 6), ("b", 6)]
-    a, b = (line.estimates for line in found.table)
+    compared = compare_conditions(results(), by="kind")
+    lines, notes = aggregate(compared)
+    assert [(line.condition, line.seeds) for line in lines] == [("a", 6), ("b", 6)]
+    a, b = (line.estimates for line in lines)
     assert (a["interquartile mean"].value, b["interquartile mean"].value) == (0.5, 1.0)
     assert b["P(improvement)"].value == 0.75, "a tie in one task, always in the other"
     assert "P(improvement)" not in a
-    assert found.curves["b"].value == pytest.approx(np.ones(4))
-    assert "within 2 of 2 tasks" in found.notes[0]
-    figure = draw_profiles(found)
-    assert len(figure.axes) == 2
+    assert "within 2 of 2 tasks" in notes[0]
+    _, shares = profiles(compared)
+    assert shares["a"].value[[0, -2, -1]].tolist() == [0.5, 0.5, 0.0]
+    assert shares["b"].value[[0, -2, -1]].tolist() == [1.0, 1.0, 0.0]
+    assert len(draw_profiles(compared).axes) == 1
 
 
 def test_lower_may_be_better() -> None:
-    line = aggregate(compare_conditions(results(), "time", by="kind")).table[1]
+    line = aggregate(compare_conditions(results(), "time", by="kind"))[0][1]
     assert line.estimates["P(improvement)"].value == 1.0
 
 

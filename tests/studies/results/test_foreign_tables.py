@@ -9,18 +9,18 @@ import pytest
 import nested_agents as na
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.results.foreign_tables import ScoreColumns, read_scores
+from nested_agents.studies.results.foreign_tables import columns_by_role, read_scores
 from nested_agents.studies.results.score_tables import table_of
 from nested_agents.studies.results.scores import ScoreResults
 
 TOPOLOGIES = {"chain": 0.2, "ring": 0.8, "star": 0.5}
-NAMES = ScoreColumns(("topology",), ("right",), "run", "question")
 ROLES = {"condition": "topology", "seed": "run", "item": "question"}
+NAMES = {**ROLES, "score": "right"}
 
 
-def read(frame: pd.DataFrame, columns: ScoreColumns = NAMES) -> ScoreResults:
+def read(frame: pd.DataFrame, columns: dict[str, str] = NAMES) -> ScoreResults:
     table = table_of(frame)
-    return read_scores(table, ScoreColumns.of(columns._asdict(), table.columns))
+    return read_scores(table, columns_by_role(columns, table.columns))
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def test_rows_in_another_order_are_the_same_results(scores) -> None:
 
 def test_without_seeds_items_are_compared_one_by_one(scores) -> None:
     few = scores[scores["run"] == 0]
-    foreign = read(few, NAMES._replace(seed=None))
+    foreign = read(few, NAMES | {"seed": None})
     assert foreign.results.seeds("chain") == ("q0", "q1", "q2", "q3")
     assert "one value of 'question'" in foreign.notes[0]
 
@@ -81,14 +81,14 @@ def test_without_either_samples_are_independent(scores) -> None:
 
 def test_several_rows_of_a_run_are_refused_unless_their_items_are_named(scores) -> None:
     with pytest.raises(SpecError, match=r"row 1: topology = 'chain', run = '0'.*item=COLUMN"):
-        read(scores, NAMES._replace(item=None))
+        read(scores, NAMES | {"item": None})
 
 
 def test_a_repeated_seed_is_shown_as_the_file_has_it(tmp_path) -> None:
     path = tmp_path / "episodes.csv"
     path.write_text("condition,seed,phase,episode,steps\n" + "a,0,training,0,5\n" * 2)
-    with pytest.raises(SpecError, match="condition = 'a', phase = 'training', seed = 0, episode"):
-        na.load(path)
+    with pytest.raises(SpecError, match="condition = 'a', phase = 'training', seed = '0', ep"):
+        na.load(path, columns=["score=steps,item=episode"])
 
 
 def test_columns_of_conditions_are_crossed(scores) -> None:
@@ -131,8 +131,8 @@ def test_scores_may_have_names_that_mean_something_in_studies(scores, name) -> N
 @pytest.mark.parametrize(
     ("changes", "names", "said"),
     [
-        ({}, NAMES._replace(score=("rihgt",)), r"score = 'rihgt': no such column; did you mean"),
-        ({}, NAMES._replace(score=("run",)), r"score = 'run': is named twice"),
+        ({}, NAMES | {"score": "rihgt"}, r"score = 'rihgt': no such column; did you mean"),
+        ({}, NAMES | {"score": "run"}, r"score = 'run': is named twice"),
         ({"right": "x"}, NAMES, r"row 0: right = 'x': must be a finite number"),
         ({"right": "0,5"}, NAMES, r"row 0: right = '0,5': must be a finite number"),
         ({"right": np.inf}, NAMES, r"row 0: right = inf: must be a finite number"),
@@ -300,7 +300,7 @@ def test_names_that_look_alike_stay_apart_and_are_told(column: str, names: tuple
         for seed in (first, "21", "22", "23")
     ]
     table = pd.DataFrame(rows, columns=["condition", "seed", "score"])
-    results, notes, _ = read(table, ScoreColumns())
+    results, notes, _ = read(table, {})
     assert {*results.conditions} == {*labels}
     assert len({seed for label in labels for seed in results.seeds(label)}) == len({*firsts}) + 3
     told = [note for note in notes if "look alike" in note]

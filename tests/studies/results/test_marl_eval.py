@@ -55,7 +55,7 @@ def test_several_tasks_are_told_apart(tmp_path) -> None:
     path.write_text(json.dumps({"vmas": {"balance": runs, "wheel": runs}}))
     study = na.load(path)
     assert study.conditions[0] == "ippo, vmas/balance"
-    (_, line) = study.compare("algorithm", "return").statistics.table
+    (_, line) = study.compare("algorithm", "return").aggregated[0].lines
     assert (line.condition, line.seeds) == ("mappo", 6)
 
 

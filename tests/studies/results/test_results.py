@@ -136,17 +136,6 @@ def test_studies_together_name_what_would_be_confused() -> None:
     )
 
 
-def test_studies_together_are_told_apart_by_what_differs() -> None:
-    one, other = (hierarchies({("chain", "team", 2): 0.5}).frames() for _ in range(2))
-    (label,) = one.conditions
-    settings = [{label: {"learner": {"kind": "batch-td", "ridge": r}}} for r in (1.0, 3.0)]
-    whole, labels = combine([("one", one), ("other", other)], settings)
-    assert whole.conditions == (f"{label}, ridge=1.0", f"{label}, ridge=3.0")
-    assert labels[1] == {label: f"{label}, ridge=3.0"}
-    whole, _ = combine([("one", one), ("other", other)], settings[:1] * 2)
-    assert whole.conditions == (f"{label} (one)", f"{label} (other)")
-
-
 @pytest.mark.parametrize("study", NAMES)
 def test_every_number_of_a_study_is_told(study: str) -> None:
     module = import_module(f"nested_agents.studies.catalogue.{study.replace('-', '_')}")
