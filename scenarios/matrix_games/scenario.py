@@ -28,7 +28,7 @@ from collections.abc import Callable, Sequence
 from itertools import combinations
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -201,21 +201,27 @@ class MatrixGame(Scenario, Prediction):
         self.action_set = ActionSet(names, (0.0,) * n_actions, (0.0,) * n_actions, neutral=0)
         self.observed = settings.observed
         self.state_space = _state_space(self.agents, names, settings.observed)
-        self.rng = np.random.default_rng(0)
-        """Generator of the payoffs."""
+        MatrixGame.reset(self, 0)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode after a random joint action."""
         self.rng = np.random.default_rng(seed)
         before = self.rng.integers(0, len(self.action_set), size=len(self.agents))
-        return self.states_after(before)
+        self.present = self.states_after(before)
+        return self.present
+
+    def play(
+        self, rngs: Sequence[np.random.Generator], states: FloatArray, joint_actions: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the next states ``(W, n, d)`` and the payoffs ``(W,)`` of ``W`` environments."""
+        drawn = [rng.integers(0, 2) for rng in rngs] if self.is_stochastic else 0
+        return self.states_after(joint_actions), self.payoffs[(drawn, *joint_actions.T)]
 
     def step(self, joint_action: IntArray) -> Transition:
         """Play once."""
-        drawn = int(self.rng.integers(0, 2)) if self.is_stochastic else 0
-        payoff = float(self.payoffs[(drawn, *joint_action)])
-        info = {"optimal": float(self.optimal[tuple(joint_action)]), "payoff": payoff}
-        return Transition(self.states_after(joint_action), payoff, False, False, info)
+        states, payoffs = self.play([self.rng], self.present[None], joint_action[None])
+        info = {"optimal": float(self.optimal[tuple(joint_action)]), "payoff": float(payoffs[0])}
+        return Transition(states[0], info["payoff"], False, False, info)
 
     def predict(self) -> MatrixGame:
         """Return this game, because predictions are the same in every play."""
@@ -233,9 +239,9 @@ class MatrixGame(Scenario, Prediction):
         """Return this game, because its predictions are exact."""
         return self
 
-    def environments(self, count: int) -> MatrixGameEnvironments:
+    def environments(self, count: int) -> GameEnvironments:
         """Return many environments that are stepped in one call."""
-        return MatrixGameEnvironments(self, count)
+        return GameEnvironments(self, count)
 
     def draw(self, path: Path | str) -> None:
         """Draw the payoffs to a picture file, in a panel for each action of a third agent."""
@@ -259,26 +265,26 @@ class MatrixGame(Scenario, Prediction):
         return np.concatenate([played[..., None], above], axis=-1)
 
 
-class MatrixGameEnvironments(StackedEnvironments[MatrixGame]):
-    """Many environments of one game."""
+class GameEnvironments(StackedEnvironments[Any]):
+    """Many environments of one game, which has the method `MatrixGame.play`."""
 
-    def allocate(self, scenario: MatrixGame, count: int) -> None:
+    def allocate(self, scenario: Any, count: int) -> None:
         """Allocate the state of all environments."""
-        self._generators = [scenario.rng] * count
+        self._rngs = [scenario.rng] * count
+        self._states = np.stack([scenario.present] * count)
 
-    def store(self, index: int, scenario: MatrixGame) -> None:
-        """Store the generator of the payoffs of an environment."""
-        self._generators[index] = scenario.rng
+    def store(self, index: int, scenario: Any) -> None:
+        """Store the generator and the initial states of an environment."""
+        self._rngs[index] = scenario.rng
+        self._states[index] = scenario.present
 
     def step(self, joint_actions: IntArray) -> Transitions:
         """Play once in every environment."""
-        drawn = np.zeros(self.count, dtype=np.int64)
-        if self.scenario.is_stochastic:
-            drawn[:] = [generator.integers(0, 2) for generator in self._generators]
-        payoffs = self.scenario.payoffs[(drawn, *joint_actions.T)]
+        states, payoffs = self.scenario.play(self._rngs, self._states, joint_actions)
+        self._states = states
         never = np.zeros(self.count, dtype=bool)
         rewards = np.broadcast_to(payoffs[:, None], joint_actions.shape)
-        return Transitions(self.scenario.states_after(joint_actions), rewards, never, never)
+        return Transitions(states.copy(), rewards, never, never)
 
 
 def _state_space(

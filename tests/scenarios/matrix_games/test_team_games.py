@@ -19,8 +19,8 @@ def begun(seed: int = 3, **keys: object) -> TeamGame:
 def test_the_best_payoff_of_a_polymatrix_game_is_that_of_enumeration(shape: str) -> None:
     game = begun(players=6, actions=3, shape=shape)
     every = np.array(list(product(range(3), repeat=6)))
-    payoffs = game.game.payoffs(every)
-    assert game.game.best == payoffs.max()
+    payoffs = game.payoffs(game.present[None], every)
+    assert game.best == payoffs.max()
     best = game.step(every[payoffs.argmax()])
     assert (best.info["optimal"], best.info["share_of_best"]) == (1.0, 1.0)
     worst = game.step(every[payoffs.argmin()])
@@ -44,14 +44,15 @@ def test_landmarks_pay_for_those_taken_less_the_way() -> None:
     game = begun(game="landmarks", players=3, distance_cost=0.5)
     far = game.reset(4)
     assert far.shape == (3, 3)
-    taken = game.game.payoffs(np.array([[0, 1, 2], [1, 1, 1], [2, 2, 0]]))
+    taken = game.payoffs(far[None].repeat(3, 0), np.array([[0, 1, 2], [1, 1, 1], [2, 2, 0]]))
     ways = [far[0, 0] + far[1, 1] + far[2, 2], far[:, 1].sum(), far[0, 2] + far[1, 2] + far[2, 0]]
     np.testing.assert_allclose(taken, [1, 1 / 3, 2 / 3] - np.array(ways) / 6)
     every = np.array(list(product(range(3), repeat=3)))
-    assert game.game.best == pytest.approx(game.game.payoffs(every).max())
-    optimal = [tuple(joint) for joint in every if game.game.is_optimal(joint)]
+    payoffs = game.payoffs(far[None].repeat(len(every), 0), every)
+    optimal = [tuple(joint) for joint in every if game.is_optimal(joint)]
     assert sorted(optimal) == sorted(permutations(range(3)))
-    transition = game.step(np.array([0, 1, 2]))
+    transition = game.step(every[payoffs.argmax()])
+    assert transition.info["share_of_best"] == pytest.approx(1.0)
     assert (transition.states != far).all(), "other places at the next play"
 
 
