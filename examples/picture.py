@@ -11,7 +11,7 @@ import sys
 
 import imageio.v3 as imageio
 
-from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
+from nested_agents.environments import joint
 
 BOX = {
     "vertices": [[0, 0], [0.3, 0], [0.3, 0.24], [0, 0.24]],
@@ -22,8 +22,12 @@ BOX = {
 }
 FAILURE = {"kind": "seized", "wheels": "robot1.front-left", "step": 6}
 
-env = BoxPushingEnv(
-    {"start": "easy", "robot": "four-wheel", "box": BOX, "failures": [FAILURE]},
+env = joint(
+    "box-pushing",
+    start="easy",
+    robot="four-wheel",
+    box=BOX,
+    failures=[FAILURE],
     render_mode="rgb_array",
 )
 env.reset(seed=1)

@@ -8,12 +8,16 @@ towards its goal; then the front left wheel of the first robot seizes.
 
 import matplotlib.pyplot as plt
 
-from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
+from nested_agents.environments import joint
 
 FAILURE = {"kind": "seized", "wheels": "robot1.front-left", "step": 9}
 
-env = BoxPushingEnv(
-    {"start": "easy", "robot": "four-wheel", "box": "T", "failures": [FAILURE]},
+env = joint(
+    "box-pushing",
+    start="easy",
+    robot="four-wheel",
+    box="T",
+    failures=[FAILURE],
     render_mode="rgb_array",
 )
 env.reset(seed=3)

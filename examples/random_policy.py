@@ -7,15 +7,13 @@ maintains or zeroes its speed. Here the wheels act at random, and one of them se
 """
 
 # sphinx_gallery_thumbnail_path = "figures/perception.png"
-from nested_agents.scenarios.box_pushing.environments import WheelsEnv
+from nested_agents.environments import parallel
 
-env = WheelsEnv(
-    {
-        "robots": 2,
-        "robot": "four-wheel",
-        "failures": [{"kind": "seized", "wheels": ["robot1.front-left"], "step": 20}],
-    },
+env = parallel(
+    "box-pushing",
     steps=40,
+    robot="four-wheel",
+    failures=[{"kind": "seized", "wheels": ["robot1.front-left"], "step": 20}],
 )
 
 observations, infos = env.reset(seed=1)

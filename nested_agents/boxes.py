@@ -5,7 +5,6 @@ For programs that drive robots themselves, or that compare a prediction with the
 
 from .core.numerics import wrap
 from .scenarios.box_pushing.driving import CLEARANCE, Drivers, paths
-from .scenarios.box_pushing.environments import BoxPushingEnv
 from .scenarios.box_pushing.prediction.prediction import BoxPrediction
 from .scenarios.box_pushing.prediction.predictors import push_model
 from .scenarios.box_pushing.prediction.push import push
@@ -19,7 +18,8 @@ from .scenarios.box_pushing.world.settings import (
     RobotSettings,
 )
 from .scenarios.box_pushing.world.starts import STARTS, approach
-from .scenarios.box_pushing.world.world import WheelFailures, World
+from .scenarios.box_pushing.world.world import World
+from .scenarios.faults.settings import Failures
 
 __all__ = [
     "BOXES",
@@ -28,13 +28,12 @@ __all__ = [
     "ROBOTS",
     "STARTS",
     "BoxPrediction",
-    "BoxPushingEnv",
     "BoxSettings",
     "BoxSpec",
     "Drivers",
     "Failure",
+    "Failures",
     "RobotSettings",
-    "WheelFailures",
     "World",
     "approach",
     "nominal_effect",

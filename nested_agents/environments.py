@@ -24,9 +24,8 @@ import gymnasium
 import pettingzoo
 
 if TYPE_CHECKING:
-    from .core.interface.scenario import Scenario
     from .scenarios.adapters.turns import TurnBasedEnv
-    from .scenarios.environments import AgentsEnv, JointEnv
+    from .scenarios.environments import AgentsEnv, JointEnv, Players
 
 WORLDS = {
     "BoxPushing": ("box-pushing", 450),
@@ -60,65 +59,62 @@ def register() -> None:
             pettingzoo.register("aec", known, f"{__name__}:turns", kwargs=options)
 
 
-def joint(kind: str, steps: int, **options: Any) -> JointEnv:
+def joint(kind: str, steps: int | None = None, **options: Any) -> JointEnv:
     """Return a Gymnasium environment in which one player acts for all agents.
 
     Parameters
     ----------
     kind
-        Of scenario.
+        Kind of the scenario.
     steps
-        Most steps of an episode.
+        Maximum number of steps of an episode. By default that of the registered id.
     **options
-        Keys of the ``[scenario]`` table; ``by_agent = true``, by which the state of every agent
-        stands in a row of its own; those of
-        `nested_agents.scenarios.box_pushing.environments.BoxPushingEnv` for boxes.
+        Keys of the ``[scenario]`` table; ``render_mode``; and ``by_agent = true`` for observations
+        with a row for each agent.
 
     Raises
     ------
     ValueError
         If there is no such key, or a value is out of range; one line.
     """
-    if kind == "box-pushing":
-        from .scenarios.box_pushing.environments import BoxPushingEnv
-
-        return BoxPushingEnv(steps=steps, **options)
     from .scenarios.environments import JointEnv
 
-    rows, mode = options.pop("by_agent", False), options.pop("render_mode", None)
-    return JointEnv(_world(kind, options), steps=steps, by_agent=rows, render_mode=mode)
+    return JointEnv(**_arguments(kind, steps, options))
 
 
-def parallel(kind: str, steps: int, **options: Any) -> AgentsEnv:
+def parallel(
+    kind: str, steps: int | None = None, players: Players = "agents", **options: Any
+) -> AgentsEnv:
     """Return a PettingZoo parallel environment with a player for every agent; see `joint`.
 
     With ``players = "bodies"`` there is one for every body: for every robot, not every wheel.
     """
-    players = options.pop("players", "agents")
+    from .scenarios.environments import AgentsEnv
+
     if players not in ("agents", "bodies"):
         raise ValueError(f"players = {players!r}, allowed: agents, bodies")
-    if kind == "box-pushing":
-        from .scenarios.box_pushing.environments import RobotsEnv, WheelsEnv
-
-        return (WheelsEnv if players == "agents" else RobotsEnv)(steps=steps, **options)
-    from .scenarios.environments import AgentsEnv, BodiesEnv
-
-    mode = options.pop("render_mode", None)
-    make = AgentsEnv if players == "agents" else BodiesEnv
-    return make(_world(kind, options), steps=steps, render_mode=mode)
+    return AgentsEnv(players=players, **_arguments(kind, steps, options))
 
 
-def _world(kind: str, table: Mapping[str, Any]) -> Scenario:
-    """Return the world of a ``[scenario]`` table."""
+def _arguments(kind: str, steps: int | None, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of an environment; further options are a ``[scenario]`` table."""
     from .core.interface.scenario import checked_scenario
     from .core.plugins.settings import tuples
     from .scenarios import SCENARIOS
 
-    return checked_scenario(SCENARIOS.parsed(kind, **tuples(table)).build())
+    own = {key: options[key] for key in ("by_agent", "render_mode") if key in options}
+    table = tuples({key: value for key, value in options.items() if key not in own})
+    if steps is None:
+        steps = {known: most for known, most in WORLDS.values()}[kind]
+    scenario = checked_scenario(SCENARIOS.parsed(kind, **table).build())
+    return {"scenario": scenario, "steps": steps, **own}
 
 
 def turns(
-    kind: str, steps: int, topology: str | Mapping[str, Any] = "chain", **options: Any
+    kind: str,
+    steps: int | None = None,
+    topology: str | Mapping[str, Any] = "chain",
+    **options: Any,
 ) -> TurnBasedEnv:
     """Return a PettingZoo AEC environment in which agents act in the order of a hierarchy.
 

@@ -18,8 +18,8 @@ from nested_agents.boxes import (
     CONTROL_PERIOD,
     ROBOTS,
     Failure,
+    Failures,
     RobotSettings,
-    WheelFailures,
     World,
     nominal_effect,
 )
@@ -45,13 +45,13 @@ def driven(robot: RobotSettings, failure: dict[str, Any] | None) -> Any:
     return np.array([cos * vx + sin * vy, cos * vy - sin * vx, omega])
 
 
-def start(robot: RobotSettings, failure: dict[str, Any] | None) -> tuple[World, WheelFailures]:
+def start(robot: RobotSettings, failure: dict[str, Any] | None) -> tuple[World, Failures]:
     """Return a robot far from any box, and its failure."""
     world = World([robot], BOXES["square"])
     world.place(np.array([[-2.0, 0.0, 0.0]]), np.zeros(3))
     agents = [f"robot1.{name}" for name in robot.wheel_names]
     settings = [] if failure is None else [TypeAdapter(Failure).validate_python(failure)]
-    ill = WheelFailures(settings, agents, np.full(len(agents), robot.max_speed))
+    ill = Failures(settings, agents, np.full(len(agents), robot.max_speed))
     world.set_grip(ill.grip)
     return world, ill
 

@@ -10,7 +10,8 @@ trains and evaluates a spec by the rules and writes ``DIR/entry.json``.
 
 Examples
 --------
->>> env = BoxPushingEnv({"robots": 2}, steps=STEPS)
+>>> from nested_agents.environments import joint
+>>> env = joint("box-pushing", STEPS, robots=2)
 >>> evaluate(lambda observation: [2, 2, 2, 2], env, seed=0)[0]
 '0000000000'
 """
@@ -22,6 +23,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, Self, get_args
 
+import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ConfigDict, Field, model_validator
@@ -29,7 +31,6 @@ from pydantic import ConfigDict, Field, model_validator
 import nested_agents as na
 from nested_agents import BoxPushingSettings, Settings, Spec, SpecError, Summary, bootstrap, rate
 from nested_agents.analysis import NOT_NEGATIVE, Results
-from nested_agents.boxes import BoxPushingEnv
 from nested_agents.study import EVALUATION_WORLDS, world_seed
 from nested_agents.terminal import (
     in_form,
@@ -181,7 +182,7 @@ def run_spec(
 
 
 def evaluate(
-    policy: Callable[[FloatArray], ArrayLike], env: BoxPushingEnv, seed: int
+    policy: Callable[[FloatArray], ArrayLike], env: gymnasium.Env, seed: int
 ) -> tuple[str, tuple[int, ...]]:
     """Return success and steps of a seed, as `TeamScores` has them.
 
@@ -190,7 +191,7 @@ def evaluate(
     policy
         Returns an action for an observation.
     env
-        A `BoxPushingEnv`, whose scenario differs from that of the benchmark in `FREE` alone.
+        An environment with the scenario of the benchmark, except for the keys in `FREE`.
     seed
         Whose worlds they are.
     """

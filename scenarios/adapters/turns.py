@@ -53,8 +53,8 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
 
     Examples
     --------
-    >>> from nested_agents.scenarios.box_pushing.environments import WheelsEnv
-    >>> env = TurnBasedEnv(WheelsEnv({"robots": 1}, steps=3))
+    >>> from nested_agents.environments import parallel
+    >>> env = TurnBasedEnv(parallel("box-pushing", robots=1))
     >>> env.reset(seed=0)
     >>> env.agent_selection, env.observe("robot1.right")[-8:].tolist()
     ('robot1.left', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])

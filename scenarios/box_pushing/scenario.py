@@ -23,6 +23,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, stream_of, working_seconds, wrap
 from ...core.plugins.words import expect
+from ..faults.settings import Failures
 from .config import BoxPushingSettings
 from .measurements import MEASURES, ORIENTATION
 from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap
@@ -40,9 +41,10 @@ from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD
 from .world.starts import place
 from .world.stepping import step_address
-from .world.world import TOUCHING, WheelFailures, World
+from .world.world import TOUCHING, World
 
 if TYPE_CHECKING:
+    from ..movies import Pixels
     from .pictures.policy import BoxPolicyMap
 
 SENSING = 2**32 - 1
@@ -118,7 +120,7 @@ class BoxPushing(Scenario):
         """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
-        self._failures = WheelFailures(settings.failures, self.agents, self._limits)
+        self._failures = Failures(settings.failures, self.agents, self._limits)
         reward_settings = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
         self.task = Task.of(
             reward_settings, self._unit * settings.tolerance, settings.orientation_tolerance
@@ -270,6 +272,12 @@ class BoxPushing(Scenario):
 
         snapshot(EpisodeRecorder(self).recording(), 0, path)
 
+    def picture(self, recording: Mapping[str, FloatArray]) -> Pixels:
+        """Return a picture ``(height, width, 3)`` of the last step of a recording."""
+        from .pictures.rendering import BoxScene
+
+        return BoxScene(recording).pixels(len(recording["box_pose"]) - 1)
+
     def show_policy(
         self,
         choose: Callable[[Prediction], IntArray],
@@ -320,7 +328,9 @@ class BoxPushing(Scenario):
 
     def _advance(self, commands: FloatArray) -> None:
         """Simulate one decision period with the given wheel speeds."""
-        self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
+        self.world.advance_failing(
+            self._failures, commands, self._step, self.settings.action_repeat
+        )
 
     @property
     def distance(self) -> float:

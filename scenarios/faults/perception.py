@@ -136,7 +136,9 @@ class PerceivedScenario(ScenarioWrapper):
 
 
 class PerceivedPrediction(Prediction):
-    """The predictions of all agents, each from the states that it perceives.
+    """Predictions of agents from the states that they perceive.
+
+    Rewards are predicted from the true state; only unperceived agents make them wrong.
 
     Parameters
     ----------
@@ -144,40 +146,28 @@ class PerceivedPrediction(Prediction):
         Prediction from the true state.
     scenario
         Scenario with the sensors.
+    agent
+        Agent that predicts. By default, each agent predicts its own states, and rewards are
+        predicted for the given joint actions.
     """
 
-    def __init__(self, prediction: Prediction, scenario: PerceivedScenario) -> None:
+    def __init__(
+        self, prediction: Prediction, scenario: PerceivedScenario, agent: int | None = None
+    ) -> None:
         self._prediction = prediction
         self._scenario = scenario
+        self._agent = agent
+        self._offsets = np.zeros(0) if agent is None else scenario.offsets(agent)
         self.repeats = prediction.repeats
 
     def of(self, agent: int) -> Prediction:
         """Return the prediction of one agent."""
-        return OwnPrediction(self._prediction, self._scenario, agent)
-
-    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states of an agent as it predicts them."""
-        return self.of(agent).states(agent, joint_actions)
-
-    def rewards(self, joint_actions: IntArray) -> FloatArray | None:
-        """Return the rewards predicted from the true state."""
-        return self._prediction.rewards(joint_actions)
-
-
-class OwnPrediction(Prediction):
-    """Prediction of one agent from the states that it perceives.
-
-    Rewards are predicted from the true state; only unperceived agents make them wrong.
-    """
-
-    def __init__(self, prediction: Prediction, scenario: PerceivedScenario, agent: int) -> None:
-        self._prediction = prediction
-        self._scenario = scenario
-        self._agent = agent
-        self._offsets = scenario.offsets(agent)
+        return PerceivedPrediction(self._prediction, self._scenario, agent)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of any agent."""
+        if self._agent is None:
+            return self.of(agent).states(agent, joint_actions)
         states = self._prediction.states(agent, self._assumed(joint_actions))
         return self._scenario.within(states + self._offsets[agent])
 
@@ -187,8 +177,10 @@ class OwnPrediction(Prediction):
 
     def _assumed(self, joint_actions: IntArray) -> IntArray:
         """Return joint actions in which unperceived agents take the neutral action."""
-        unperceived = self._scenario.unperceived(self._agent)
+        if self._agent is None:
+            return joint_actions
         assumed = joint_actions.copy()
+        unperceived = self._scenario.unperceived(self._agent)
         assumed[:, unperceived] = self._scenario.action_set.neutral
         return assumed
 
@@ -206,10 +198,10 @@ def distances_of(scenario: Scenario) -> FloatArray:
     """
     groups = scenario.groups
     bodies = {agent: body for body, group in enumerate(groups) for agent in group}
-    graph = nx.path_graph(len(groups))
     interactions = interactions_of(scenario)
+    graph = nx.path_graph(len(groups))
     if interactions is not None:
-        graph.remove_edges_from(list(graph.edges))
+        graph = nx.create_empty_copy(graph)
         graph.add_edges_from((bodies[a], bodies[b]) for a, b in interactions)
     apart = np.full((len(groups), len(groups)), np.inf)
     for body, lengths in nx.all_pairs_shortest_path_length(graph):

@@ -1,22 +1,22 @@
 """Failures of actuators: their kinds, settings and schedule.
 
-The `KINDS` of failure do not depend on the scenario. A scenario names its actuators (``wheels``,
-``joints``) in a model that inherits `FailureSettings`, and `build_kinds` combines that model with
-the kinds it supports::
+The `EFFECTS` of failures do not depend on the scenario. A scenario names its actuators (``wheels``,
+``joints``) in a model that inherits `FailureSettings`, and `build_kinds` extends that model to each
+kind that it supports::
 
     class WheelFailure(FailureSettings):
         part = "wheels"
         wheels: Names
 
-    Failure = Annotated[Union[*build_kinds(WheelFailure, **KINDS).values()], DISCRIMINATOR]
+    Failure = Annotated[Union[*build_kinds(WheelFailure).values()], DISCRIMINATOR]
 
 A failure changes the speed that the servo of an actuator holds for a command, see
-`FailureSettings.held`. Agents observe their commands, not the failure. If an actuator has several
+`held_speeds`. Agents observe their commands, not the failure. If an actuator has several
 failures, delays act first, then the others in the order of the spec.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Generic, Literal, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.random import Generator
@@ -26,131 +26,127 @@ from ...core.hierarchy.failures import Scheduled
 from ...core.numerics import BoolArray, FloatArray, stream_of
 
 
+def _parameter(default: float, text: str, **bounds: float) -> tuple[Any, object]:
+    """Return type and default of a setting for pydantic."""
+    return Annotated[type(default), Field(**cast(Any, bounds))], Field(default, description=text)
+
+
 class FailureSettings(Scheduled):
-    """Settings that all kinds of failure share: a schedule, and a change of held speeds."""
+    """Settings that all kinds of failure share: a schedule."""
 
-    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the speeds ``(periods, k)`` that the servos of failed actuators hold.
-
-        Parameters
-        ----------
-        commands
-            ``(periods, k)`` commanded speeds.
-        limits
-            ``(k,)`` maximum speeds.
-        rng
-            Generator of the noise in every control period.
-        """
-        return commands
+    effect: ClassVar[str] = ""
+    """What the actuators do, a key of `EFFECTS`."""
 
 
-class Seized(FailureSettings):
-    """It does not move."""
+Parameters = Mapping[str, tuple[Any, object]]
+"""Type and default of settings by name."""
 
-    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return 0."""
-        return np.zeros_like(commands)
-
-
-class Free(FailureSettings):
-    """It has no drive and gives way; the scenario implements this."""
-
-
-class Weak(FailureSettings):
-    """It moves at a fraction of its command."""
-
-    gain: Annotated[float, Field(gt=0, lt=1)] = 0.3
-    """Fraction of its command at which it moves."""
-
-    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the gain times the command."""
-        return self.gain * commands
-
-
-class Reversed(FailureSettings):
-    """It moves against its command."""
-
-    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the command with its sign changed."""
-        return -commands
-
-
-class Stuck(FailureSettings):
-    """It moves at a fixed speed for all commands."""
-
-    speed: Annotated[float, Field(ge=-1, le=1)] = 0.5
-    """Speed at which it moves, as a fraction of the maximum."""
-
-    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the fixed speed."""
-        return np.broadcast_to(self.speed * limits, commands.shape)
-
-
-class Delayed(FailureSettings):
-    """It executes its commands too late; `Failures` stores them."""
-
-    periods: Annotated[int, Field(ge=1, le=1000)] = 8
-    """Delay of commands in control periods."""
-
-
-class Noisy(FailureSettings):
-    """It moves at its command plus noise."""
-
-    deviation: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Standard deviation of the noise, as a fraction of the maximum speed."""
-
-    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
-        """Return the command plus noise, clipped to the maximum speed."""
-        noise = self.deviation * limits * rng.standard_normal(commands.shape)
-        return np.clip(commands + noise, -limits, limits)
-
-
-KINDS: Mapping[str, type[FailureSettings]] = {
-    kind.__name__.lower(): kind for kind in (Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy)
+EFFECTS: Mapping[str, tuple[str, Parameters]] = {
+    "seized": ("does not move", {}),
+    "free": ("has no drive and gives way", {}),
+    "weak": (
+        "moves at a fraction of its command",
+        {"gain": _parameter(0.3, "Fraction of its command at which it moves.", gt=0, lt=1)},
+    ),
+    "reversed": ("moves against its command", {}),
+    "stuck": (
+        "moves at a fixed speed for all commands",
+        {
+            "speed": _parameter(
+                0.5, "Speed at which it moves, as a fraction of the maximum.", ge=-1, le=1
+            )
+        },
+    ),
+    "delayed": (
+        "executes its commands too late",
+        {"periods": _parameter(8, "Delay of commands in control periods.", ge=1, le=1000)},
+    ),
+    "noisy": (
+        "moves at its command plus noise",
+        {
+            "deviation": _parameter(
+                0.3,
+                "Standard deviation of the noise, as a fraction of the maximum speed.",
+                gt=0,
+                le=1,
+            )
+        },
+    ),
 }
-"""The kinds of failure by name."""
+"""What actuators of each kind of failure do, and the settings of that kind."""
 DISCRIMINATOR = Field(discriminator="kind")
 """Pydantic field for failures of several kinds."""
 
 
-def build_kinds(
-    naming: type[FailureSettings], **kinds: type[FailureSettings]
-) -> dict[str, type[Any]]:
+def held_speeds(
+    failure: FailureSettings, commands: FloatArray, limits: FloatArray, rng: Generator
+) -> FloatArray:
+    """Return the speeds ``(periods, k)`` that the servos of failed actuators hold.
+
+    Delays and actuators without a drive, which keep their commands here, are implemented by
+    `Failures` and by the scenario.
+
+    Parameters
+    ----------
+    failure
+        The failure.
+    commands
+        ``(periods, k)`` commanded speeds.
+    limits
+        ``(k,)`` maximum speeds.
+    rng
+        Generator of the noise in every control period.
+    """
+    values = dict(failure)
+    match failure.effect:
+        case "seized":
+            return np.zeros_like(commands)
+        case "weak":
+            return values["gain"] * commands
+        case "reversed":
+            return -commands
+        case "stuck":
+            return np.broadcast_to(values["speed"] * limits, commands.shape)
+        case "noisy":
+            noise = values["deviation"] * limits * rng.standard_normal(commands.shape)
+            return np.clip(commands + noise, -limits, limits)
+    return commands
+
+
+def build_kinds(naming: type[FailureSettings], **effects: str) -> dict[str, type[Any]]:
     """Return models of failures of the actuators that `naming` names, by ``kind``.
 
-    Each model inherits its kind and `naming`, and is an attribute of `naming` so that it can be
-    pickled.
+    Each model inherits `naming`, and is an attribute of `naming` so that it can be pickled. By
+    default, the kinds are the effects.
 
     Examples
     --------
     >>> class CartFailure(FailureSettings):
     ...     part = "carts"
     ...     carts: tuple[str, ...]
-    >>> build_kinds(CartFailure, loose=Free)["loose"](carts=("left",))
+    >>> build_kinds(CartFailure, loose="free")["loose"](carts=("left",))
     Loose(episode=0, step=0, end_episode=None, end_step=0, carts=('left',), kind='loose')
     >>> CartFailure.Loose.__doc__
     'The cart has no drive and gives way.'
     """
     models = {}
-    for kind, base in kinds.items():
-        sentence = (base.__doc__ or "").partition(";")[0].rstrip(".")
-        model = create_model(
+    for kind, effect in (effects or dict.fromkeys(EFFECTS)).items():
+        sentence, parameters = EFFECTS[effect or kind]
+        model: type[Any] = create_model(
             kind.capitalize(),
-            __base__=(base, naming),
+            __base__=naming,
             __module__=naming.__module__,
-            __doc__=sentence.replace("It", f"The {naming.part.removesuffix('s')}", 1) + ".",
-            kind=(cast(Any, Literal[kind]), kind),
+            __doc__=f"The {naming.part.removesuffix('s')} {sentence}.",
+            **cast(Any, {**parameters, "kind": (Literal[kind], kind)}),
         )
         model.__qualname__ = f"{naming.__qualname__}.{model.__name__}"
+        model.effect = effect or kind
         setattr(naming, model.__name__, model)
         models[kind] = model
     return models
 
 
-FailureT = TypeVar("FailureT", bound=FailureSettings)
-
-
-class Failures(Generic[FailureT]):
+class Failures:
     """Scheduled failures of a set of actuators.
 
     Parameters
@@ -171,11 +167,11 @@ class Failures(Generic[FailureT]):
 
     Examples
     --------
-    >>> from nested_agents.scenarios.faults.settings import Seized
-    >>> class SeizedCart(Seized):
+    >>> class CartFailure(FailureSettings):
     ...     part = "carts"
     ...     carts: tuple[str, ...]
-    >>> failures = Failures([SeizedCart(carts=("left",), step=3)], ("left", "right"), np.ones(2))
+    >>> seized = build_kinds(CartFailure)["seized"](carts=("left",), step=3)
+    >>> failures = Failures([seized], ("left", "right"), np.ones(2))
     >>> failures.begin(0, episode=0)
     >>> failures.strike(2), failures.strike(3), failures.failed
     (False, True, array([ True, False]))
@@ -185,23 +181,23 @@ class Failures(Generic[FailureT]):
 
     def __init__(
         self,
-        settings: Sequence[FailureT],
+        settings: Sequence[FailureSettings],
         agents: Sequence[str],
         limits: FloatArray,
         key: str = "scenario.failures",
     ) -> None:
-        self._settings = tuple(settings)
-        self._delays_first = sorted(
-            range(len(settings)), key=lambda i: not isinstance(settings[i], Delayed)
-        )
+        self.settings = tuple(settings)
+        delays = {i: dict(f)["periods"] for i, f in enumerate(settings) if f.effect == "delayed"}
+        self._delays_first = sorted(range(len(settings)), key=lambda i: i not in delays)
         self._limits = limits
         self._masks = [failure.mask(agents, f"{key}[{i}]") for i, failure in enumerate(settings)]
-        self._max_delay = max((f.periods for f in settings if isinstance(f, Delayed)), default=0)
+        self._delays = delays
+        self._max_delay = max(delays.values(), default=0)
         self.begin(0, 0)
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
         """Start an episode; each failure draws its noise from its own stream of `seed`."""
-        self._streams = [stream_of(seed, i) for i in range(len(self._settings))]
+        self._streams = [stream_of(seed, i) for i in range(len(self.settings))]
         self._episode = episode
         # Commands of the last control periods, oldest first
         self._commands = np.zeros((self._max_delay, len(self._limits)))
@@ -212,7 +208,7 @@ class Failures(Generic[FailureT]):
         """Start and end the failures that are due at a step; return whether any changed."""
         former = self._active
         self._active = tuple(
-            i for i in self._delays_first if self._settings[i].lasts(self._episode, step)
+            i for i in self._delays_first if self.settings[i].lasts(self._episode, step)
         )
         return self._active != former
 
@@ -230,21 +226,28 @@ class Failures(Generic[FailureT]):
         history = np.vstack([self._commands, speeds])
         for i in self._active:
             mask = self._masks[i]
-            failure = self._settings[i]
-            if isinstance(failure, Delayed):
-                first = self._max_delay - failure.periods
+            if i in self._delays:
+                first = self._max_delay - self._delays[i]
                 speeds[:, mask] = history[first : first + periods, mask]
             else:
-                limits = self._limits[mask]
-                stream = self._streams[i]
-                speeds[:, mask] = failure.held(speeds[:, mask], limits, stream)
+                limits, stream = self._limits[mask], self._streams[i]
+                speeds[:, mask] = held_speeds(self.settings[i], speeds[:, mask], limits, stream)
         self._commands = history[len(history) - self._max_delay :]
         return speeds
 
-    def active(self) -> Iterator[tuple[FailureT, BoolArray]]:
+    def active(self) -> Iterator[tuple[FailureSettings, BoolArray]]:
         """Yield the active failures, each with the mask ``(n,)`` of its actuators."""
         for i in self._active:
-            yield self._settings[i], self._masks[i]
+            yield self.settings[i], self._masks[i]
+
+    @property
+    def grip(self) -> FloatArray:
+        """Factor on the stiffness of every drive ``(n,)``: 0 for free actuators, else 1."""
+        grip = np.ones(len(self._limits))
+        for failure, mask in self.active():
+            if failure.effect == "free":
+                grip[mask] = 0.0
+        return grip
 
     @property
     def failed(self) -> BoolArray:

@@ -39,7 +39,6 @@ from pettingzoo.utils import BaseParallelWrapper
 from ...core.numerics import BoolArray, FloatArray
 from ...core.plugins.settings import Names
 from ..library_types import Data, Environment, Options, Space
-from . import settings
 from .settings import Failures, FailureSettings, build_kinds
 
 
@@ -54,7 +53,7 @@ class ActuatorFault(FailureSettings):
     """Kind of the fault."""
 
 
-KINDS = build_kinds(ActuatorFault, **settings.KINDS)
+KINDS = build_kinds(ActuatorFault)
 """The kinds of fault by name."""
 Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy = KINDS.values()
 

@@ -13,7 +13,7 @@ from ...core.plugins.settings import (
     Settings,
     team_size,
 )
-from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
+from ..faults.settings import DISCRIMINATOR, FailureSettings, build_kinds
 from ..state_variables import names_of
 from .variables import CHAIN_VARIABLES
 
@@ -60,8 +60,9 @@ class JointFailure(FailureSettings):
 if TYPE_CHECKING:
     Failure = JointFailure
 else:
-    _ALIKE = {kind: KINDS[kind] for kind in ("weak", "reversed", "stuck")}
-    _KINDS = build_kinds(JointFailure, locked=KINDS["seized"], **_ALIKE)
+    _KINDS = build_kinds(
+        JointFailure, locked="seized", weak="weak", reversed="reversed", stuck="stuck"
+    )
     Failure = Annotated[Union[*_KINDS.values()], DISCRIMINATOR]
 """Settings of a failure of any `kind`."""
 

@@ -10,8 +10,8 @@ from programs import main
 
 import nested_agents as na
 from nested_agents.core.agents.loop import world_seed
+from nested_agents.environments import joint
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 from research import push_n
 
@@ -97,7 +97,7 @@ def test_the_schema_of_the_docs(entry: Any, capsys: pytest.CaptureFixture[str]) 
 
 
 def test_worlds_are_those_of_evaluations_in_studies() -> None:
-    env = BoxPushingEnv({"robots": 2}, steps=2)
+    env = joint("box-pushing", 2, robots=2)
     worlds = []
 
     def maintain(observation: Any) -> list[int]:

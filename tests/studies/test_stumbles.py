@@ -104,9 +104,9 @@ def test_errors_in_python_are_one_line_that_names_the_field(make, complaint: str
 
 
 def test_a_missing_agent_is_named() -> None:
-    from nested_agents.scenarios.box_pushing.environments import WheelsEnv
+    from nested_agents.environments import parallel
 
-    env = WheelsEnv({"robots": 1}, steps=3)
+    env = parallel("box-pushing", 3, robots=1)
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"step: .*'robot1.right' is missing"):
         env.step({"robot1.left": 0})

@@ -21,11 +21,12 @@ import numpy as np
 from ....core.interface.prediction import Assumptions
 from ....core.numerics import FloatArray, IntArray
 from ....core.values.rule_base import RuleBase
+from ...faults.settings import Failures
 from ..states.situations import SituationBatch
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
-from ..world.world import WheelFailures, World, WorldState
+from ..world.world import World, WorldState
 from .models import PushModel
 from .prediction import BoxPrediction, PredictionSettings, PresentState
 from .settings import BeliefSettings
@@ -62,7 +63,7 @@ class Future:
     """World with the same robots and box, for playing; modified."""
     state: WorldState
     """State to start from."""
-    failures: WheelFailures
+    failures: Failures
     """Failures of the scenario; not modified."""
     step: int
     """Number of the step to come."""
@@ -79,13 +80,13 @@ class Future:
         failures = self._play(commands, self.hold)
         return replace(self, state=self.world.state(), failures=failures, step=self.step + 1)
 
-    def _play(self, commands: FloatArray, periods: int) -> WheelFailures:
+    def _play(self, commands: FloatArray, periods: int) -> Failures:
         """Play control periods from the saved state; return the failures at their end."""
         self.world.restore(self.state)
         failures = deepcopy(self.failures)
         self.world.set_grip(failures.grip)
         for number, past in enumerate(range(0, periods, self.hold), self.step):
-            failures.advance(self.world, commands, number, min(self.hold, periods - past))
+            self.world.advance_failing(failures, commands, number, min(self.hold, periods - past))
         return failures
 
 

@@ -3,23 +3,26 @@
 A box is a polygon, see `polygons`, or a disc. The frame of a box has its center of mass at the
 origin and its back, where robots start in the easier start distributions, towards -x. Its weight
 rests on the ground as a distributed friction, represented by four points, so that sliding and
-turning share one friction budget as they do for a real box. A further box is one `BoxSpec` and one
-line in `BOXES`; a spec may also describe one by its vertices.
+turning share one friction budget as they do for a real box. A further box is one table in
+``boxes.toml``; a spec may also describe one by its vertices.
 
 Units are those of the caller as long as they are consistent.
 """
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import cos, pi, sin, sqrt
+from math import pi, sqrt
+from pathlib import Path
 
 import numpy as np
 from shapely.affinity import translate
 from shapely.geometry import Point, Polygon
 
 from ....core.numerics import FloatArray
+from ....core.plugins.settings import tuples
 from ....core.plugins.words import closest
 from .geometry import BoxShape
 from .polygons import (
@@ -35,8 +38,6 @@ from .polygons import (
 )
 from .settings import GRAVITY, BoxSettings
 
-AREA = 0.04
-"""Area of every named box: that of a square of 20 cm [m2]."""
 ROBOTS_PER_BOX = 2
 """Number of robots for which the named boxes are made."""
 
@@ -267,53 +268,7 @@ def _spec_of(box: str | BoxSettings) -> BoxSpec:
     return BOXES[box]
 
 
-def _rectangle(name: str, depth: float, width: float) -> BoxSpec:
-    x = depth / 2
-    y = width / 2
-    return BoxSpec(name, ((-x, -y), (x, -y), (x, y), (-x, y)))
+_TABLES = tuples(tomllib.loads(Path(__file__).with_name("boxes.toml").read_text(encoding="utf-8")))
 
-
-def _regular(name: str, sides: int) -> BoxSpec:
-    """Return a regular polygon of area `AREA` with a side towards -x."""
-    radius = sqrt(2 * AREA / (sides * sin(2 * pi / sides)))
-    angles = [pi + pi / sides + 2 * pi * i / sides for i in range(sides)]
-    return BoxSpec(name, tuple((radius * cos(a), radius * sin(a)) for a in angles))
-
-
-def _shape(name: str, *vertices: tuple[float, float]) -> BoxSpec:
-    """Return a polygon scaled to `AREA`."""
-    unit = sqrt(AREA / Polygon(vertices).area)
-    return BoxSpec(name, tuple((unit * x, unit * y) for x, y in vertices))
-
-
-def _star(name: str, points: int, depth: float) -> BoxSpec:
-    """Return a star with a point ahead and hollows of `depth`, relative to its radius."""
-    corners = [(1.0, 2 * pi * i / points) for i in range(points)]
-    hollows = [(1.0 - depth, angle + pi / points) for _, angle in corners]
-    ring = [corner for pair in zip(corners, hollows, strict=True) for corner in pair]
-    return _shape(name, *((radius * cos(angle), radius * sin(angle)) for radius, angle in ring))
-
-
-PLUS = (
-    (-3, -1), (-1, -1), (-1, -3), (1, -3), (1, -1), (3, -1),
-    (3, 1), (1, 1), (1, 3), (-1, 3), (-1, 1), (-3, 1),
-)  # fmt: skip
-
-BOXES: dict[str, BoxSpec] = {
-    box.name: box
-    for box in (
-        _rectangle("square", 0.2, 0.2),
-        _rectangle("rectangle", 0.16, 0.25),
-        _rectangle("bar", 0.08, 0.5),
-        BoxSpec("circle", radius=sqrt(AREA / pi)),
-        _regular("triangle", 3),
-        _regular("pentagon", 5),
-        _regular("hexagon", 6),
-        _shape("L", (0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)),
-        _shape("T", (0, -3), (2, -3), (2, -1), (5, -1), (5, 1), (2, 1), (2, 3), (0, 3)),
-        _shape("U", (0, -2), (3, -2), (3, -1), (1, -1), (1, 1), (3, 1), (3, 2), (0, 2)),
-        _shape("plus", *PLUS),
-        _star("star", 5, 0.5),
-    )
-}
+BOXES = {name: BoxSpec(name, **table) for name, table in _TABLES.items()}
 """Boxes by the name that specs use; every one has the area of the square."""

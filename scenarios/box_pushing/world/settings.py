@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from ....core.numerics import FloatArray
 from ....core.plugins.settings import Names, NonNegative, Positive, Settings
 from ....core.plugins.sources import active
-from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, build_kinds
+from ...faults.settings import DISCRIMINATOR, FailureSettings, build_kinds
 from .infrared import Response, readings_at
 
 GRAVITY = 9.81
@@ -69,7 +69,7 @@ class WheelFailure(FailureSettings):
 if TYPE_CHECKING:
     Failure = WheelFailure
 else:
-    Failure = Annotated[Union[*build_kinds(WheelFailure, **KINDS).values()], DISCRIMINATOR]
+    Failure = Annotated[Union[*build_kinds(WheelFailure).values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 
 

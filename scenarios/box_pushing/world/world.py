@@ -24,7 +24,7 @@ import Box2D
 import numpy as np
 
 from ....core.numerics import BoolArray, FloatArray, IntArray
-from ...faults.settings import Failures, FailureSettings, Free
+from ...faults.settings import Failures
 from .boxes import BoxSpec
 from .geometry import gaps
 from .infrared import InfraredSensors, infrared_readings
@@ -218,6 +218,14 @@ class World:
         )
         self._know(poses)
 
+    def advance_failing(
+        self, failures: Failures, commands: FloatArray, step: int, periods: int
+    ) -> None:
+        """Simulate control periods of a step with commands ``(n_wheels,)``, subject to failures."""
+        if failures.strike(step):
+            self.set_grip(failures.grip)
+        self.advance(failures.driven(commands, periods) if failures.settings else commands, periods)
+
     def _advance_by_steps(self, speeds: FloatArray) -> None:
         """Simulate control periods with speeds ``(periods, n_wheels)``, step by step."""
         touched = np.zeros(len(self.robots))
@@ -314,22 +322,3 @@ class World:
                 maxTorque=0.0,
                 collideConnected=True,
             )
-
-
-class WheelFailures(Failures[FailureSettings]):
-    """The failures that a spec schedules, and the wheels under them."""
-
-    @property
-    def grip(self) -> FloatArray:
-        """Factor on the drive stiffness of every wheel ``(n,)``: 0 for free wheels, else 1."""
-        grip = np.ones(len(self.failed))
-        for failure, wheels in self.active():
-            if isinstance(failure, Free):
-                grip[wheels] = 0.0
-        return grip
-
-    def advance(self, world: World, commands: FloatArray, step: int, periods: int) -> None:
-        """Simulate control periods of a step with the given wheel speeds, subject to failures."""
-        if self.strike(step):
-            world.set_grip(self.grip)
-        world.advance(self.driven(commands, periods) if self._settings else commands, periods)

@@ -10,11 +10,15 @@ from made_up_environments import CutForAll, EndsForAll
 from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, seed_test
 
+from nested_agents import environments
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.scenarios.adapters.turns import TurnBasedEnv
-from nested_agents.scenarios.box_pushing.environments import RobotsEnv, WheelsEnv
 
-FAST: Any = {"action_repeat": 2}
+
+def boxes(steps: int, **options: Any) -> Any:
+    return environments.parallel("box-pushing", steps, action_repeat=2, **options)
+
+
 ADVICE = (
     "We recommend agents to be named", "Action space for each agent probably should",
     "Agent's m.* observation space value is",
@@ -102,9 +106,9 @@ def of_joint_steps(env: TurnBasedEnv, act: Any) -> Any:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: TurnBasedEnv(WheelsEnv(FAST, steps=15)),
-        lambda: TurnBasedEnv(WheelsEnv(FAST, steps=15), TREE),
-        lambda: TurnBasedEnv(RobotsEnv(FAST, steps=15)),
+        lambda: TurnBasedEnv(boxes(15)),
+        lambda: TurnBasedEnv(boxes(15), TREE),
+        lambda: TurnBasedEnv(boxes(15, players="bodies")),
         lambda: TurnBasedEnv(Leaving()),
     ],
 )
@@ -118,7 +122,7 @@ def test_pettingzoo_finds_nothing(make: Any) -> None:
 
 
 def test_it_is_the_world_of_the_parallel_environment() -> None:
-    turns, parallel = TurnBasedEnv(WheelsEnv(FAST, steps=6), TREE), WheelsEnv(FAST, steps=6)
+    turns, parallel = TurnBasedEnv(boxes(6), TREE), boxes(6)
     turns.reset(seed=4)
     told = parallel.reset(seed=4)[0]
     rng = np.random.default_rng(0)
@@ -146,7 +150,7 @@ def test_it_is_the_world_of_the_parallel_environment() -> None:
 
 
 def test_what_is_passed_is_of_this_step_alone() -> None:
-    env = TurnBasedEnv(RobotsEnv(FAST, steps=3))
+    env = TurnBasedEnv(boxes(3, players="bodies"))
     env.reset(seed=0)
     env.step(np.array([1, 3]))
     assert env.observe("robot1")[-16:].tolist() == [0] * 16

@@ -10,18 +10,30 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
+from nested_agents import environments
+from nested_agents.core.plugins.settings import changed_values
+from nested_agents.environments import env_id
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.environments import (
-    ENV_ID,
-    BoxPushingEnv,
-    RobotsEnv,
-    WheelsEnv,
-)
 from nested_agents.scenarios.box_pushing.pictures.rendering import SIDES
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import WheelFailure
+from nested_agents.scenarios.environments import AgentsEnv, JointEnv
 
-PARALLEL = [WheelsEnv, RobotsEnv]
+
+def wheels(settings: BoxPushingSettings, steps: int = 450, **options: Any) -> AgentsEnv:
+    return AgentsEnv(settings.build(), steps=steps, **options)
+
+
+def robots(settings: BoxPushingSettings, steps: int = 450) -> AgentsEnv:
+    return wheels(settings, steps, players="bodies")
+
+
+def joint(settings: BoxPushingSettings, steps: int = 450, **options: Any) -> JointEnv:
+    return JointEnv(settings.build(), steps=steps, **options)
+
+
+PARALLEL = [wheels, robots]
+PLAIN = BoxPushingSettings()
 SETTINGS = [
     BoxPushingSettings(action_repeat=2),
     BoxPushingSettings(
@@ -35,7 +47,7 @@ SETTINGS = [
 
 @pytest.mark.parametrize("kind", PARALLEL)
 @pytest.mark.parametrize("settings", SETTINGS)
-def test_pettingzoo_finds_nothing(kind: type[WheelsEnv], settings: BoxPushingSettings) -> None:
+def test_pettingzoo_finds_nothing(kind: Any, settings: BoxPushingSettings) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         parallel_api_test(kind(settings, steps=30), num_cycles=50)
@@ -44,7 +56,9 @@ def test_pettingzoo_finds_nothing(kind: type[WheelsEnv], settings: BoxPushingSet
 
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_gymnasium_finds_nothing(settings: BoxPushingSettings) -> None:
-    env = gymnasium.make(ENV_ID, settings=settings, steps=20, render_mode="rgb_array")
+    keys = changed_values(settings)
+    del keys["kind"]
+    env = gymnasium.make(env_id("BoxPushing"), steps=20, render_mode="rgb_array", **keys)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # Robots may go as far away as they like: such bounds are the true ones.
@@ -53,7 +67,7 @@ def test_gymnasium_finds_nothing(settings: BoxPushingSettings) -> None:
     env.close()
 
 
-def play(env: WheelsEnv, seed: int | None = 3, steps: int = 12) -> list[Any]:
+def play(env: AgentsEnv, seed: int | None = 3, steps: int = 12) -> list[Any]:
     """Return all that an episode of equal random actions gives, as comparable bits."""
     rng = np.random.default_rng(5)
     given: list[Any] = [env.reset(seed=seed)[0]]
@@ -68,7 +82,7 @@ def play(env: WheelsEnv, seed: int | None = 3, steps: int = 12) -> list[Any]:
 
 
 @pytest.mark.parametrize("kind", PARALLEL)
-def test_whole_episodes_follow_from_the_seed(kind: type[WheelsEnv]) -> None:
+def test_whole_episodes_follow_from_the_seed(kind: Any) -> None:
     env = kind(SETTINGS[0])
     first, second = play(env), play(env, seed=None)
     assert first != second
@@ -78,11 +92,11 @@ def test_whole_episodes_follow_from_the_seed(kind: type[WheelsEnv]) -> None:
 
 
 def test_the_three_views_show_one_scenario() -> None:
-    wheels, robots, joint = (kind(SETTINGS[1]) for kind in (WheelsEnv, RobotsEnv, BoxPushingEnv))
+    by_agent, by_body, single = (kind(SETTINGS[1]) for kind in (wheels, robots, joint))
     scenario = BoxPushing(SETTINGS[1])
-    seen = [wheels.reset(seed=1)[0], robots.reset(seed=1)[0], joint.reset(seed=1)[0]]
+    seen = [env.reset(seed=1)[0] for env in (by_agent, by_body, single)]
     states = scenario.reset(int(np.random.default_rng(1).integers(2**63)))
-    rows = BoxPushingEnv(SETTINGS[1], by_wheel=True).reset(seed=1)[0]
+    rows = joint(SETTINGS[1], by_agent=True).reset(seed=1)[0]
     np.testing.assert_array_equal(rows, states.astype(np.float32))
     rng = np.random.default_rng(2)
     for _ in range(8):
@@ -101,32 +115,32 @@ def test_the_three_views_show_one_scenario() -> None:
         states = transition.states
         by_wheel = dict(zip(scenario.agents, action, strict=True))
         by_robot = {f"robot{r + 1}": action[3 * r : 3 * r + 3] for r in range(3)}
-        one, two, three = wheels.step(by_wheel), robots.step(by_robot), joint.step(action)
+        one, two, three = by_agent.step(by_wheel), by_body.step(by_robot), single.step(action)
         seen = [one[0], two[0], three[0]]
         assert set(one[1].values()) | set(two[1].values()) | {three[1]} == {transition.reward}
 
 
 def test_rewards_are_those_of_the_agents_own_wheels() -> None:
     settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
-    wheels, robots, joint = (kind(settings) for kind in (WheelsEnv, RobotsEnv, BoxPushingEnv))
+    by_agent, by_body, single = (kind(settings) for kind in (wheels, robots, joint))
     scenario = BoxPushing(settings)
     scenario.reset(int(np.random.default_rng(6).integers(2**63)))
-    for env in (wheels, robots, joint):
+    for env in (by_agent, by_body, single):
         env.reset(seed=6)
     differed = False
     for _ in range(20):
         paid = scenario.step(np.zeros(4, dtype=int)).reward
         differed |= paid[0] != paid[2]
-        assert list(wheels.step(dict.fromkeys(wheels.agents, 0))[1].values()) == list(paid)
-        of_robots = robots.step({robot: [0, 0] for robot in robots.agents})[1]
+        assert list(by_agent.step(dict.fromkeys(by_agent.agents, 0))[1].values()) == list(paid)
+        of_robots = by_body.step({robot: [0, 0] for robot in by_body.agents})[1]
         assert list(of_robots.values()) == [paid[0], paid[2]]
-        assert joint.step(np.zeros(4))[1] == np.mean(paid)
+        assert single.step(np.zeros(4))[1] == np.mean(paid)
     assert differed
 
 
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_observations_stay_within_their_spaces(settings: BoxPushingSettings) -> None:
-    env = BoxPushingEnv(settings, steps=60)
+    env = joint(settings, 60)
     env.action_space.seed(0)
     for seed in range(4):
         seen, _ = env.reset(seed=seed)
@@ -137,7 +151,7 @@ def test_observations_stay_within_their_spaces(settings: BoxPushingSettings) -> 
 
 
 def test_episodes_are_counted_so_that_failures_set_in() -> None:
-    env = WheelsEnv(SETTINGS[2], steps=2)
+    env = wheels(SETTINGS[2], 2)
     failed = []
     for options in (None, None, {"episode": 0}, {"episode": 7}, None):
         _, infos = env.reset(seed=0 if not failed else None, options=options)
@@ -146,16 +160,16 @@ def test_episodes_are_counted_so_that_failures_set_in() -> None:
 
 
 def test_an_episode_ends_by_the_clock_and_at_the_goal() -> None:
-    env = BoxPushingEnv({"tolerance": 5.0}, steps=1)
+    env = joint(BoxPushingSettings(tolerance=5.0), 1)
     env.reset(seed=0)
     assert env.step(np.zeros(4))[2:4] == (True, False)
-    env = BoxPushingEnv(steps=2)
+    env = joint(PLAIN, 2)
     env.reset(seed=0)
     assert [env.step(np.zeros(4))[3] for _ in range(2)] == [False, True]
 
 
 def test_a_step_after_the_end_is_empty() -> None:
-    env = WheelsEnv(steps=1)
+    env = wheels(PLAIN, 1)
     env.reset(seed=0)
     assert env.step(dict.fromkeys(env.agents, 0))[3]["robot1.left"]
     assert env.agents == []
@@ -165,9 +179,9 @@ def test_a_step_after_the_end_is_empty() -> None:
 
 def test_several_side_by_side_are_those_of_their_seeds() -> None:
     envs = gymnasium.make_vec(
-        ENV_ID, num_envs=2, vectorization_mode="sync", settings=SETTINGS[0], steps=4
+        env_id("BoxPushing"), num_envs=2, vectorization_mode="sync", action_repeat=2, steps=4
     )
-    single = [BoxPushingEnv(SETTINGS[0], steps=4) for _ in range(2)]
+    single = [joint(SETTINGS[0], 4) for _ in range(2)]
     seen = envs.reset(seed=6)[0]
     expected = [env.reset(seed=6 + i)[0] for i, env in enumerate(single)]
     for _ in range(4):
@@ -183,7 +197,7 @@ def test_several_side_by_side_are_those_of_their_seeds() -> None:
 
 
 def test_pictures() -> None:
-    env = BoxPushingEnv(SETTINGS[2], render_mode="rgb_array")
+    env = joint(SETTINGS[2], render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="call reset first"):
         env.render()
     env.reset(seed=0, options={"episode": 1})
@@ -191,17 +205,19 @@ def test_pictures() -> None:
     assert (first.shape, first.dtype) == ((SIDES[1], SIDES[0], 3), np.uint8)
     env.step(np.zeros(4))
     assert (env.render() != first).any()
-    each = BoxPushingEnv({"reward": {"of": "robot"}}, render_mode="rgb_array")
+    each = joint(
+        BoxPushingSettings.model_validate({"reward": {"of": "robot"}}), render_mode="rgb_array"
+    )
     each.reset(seed=0)
     each.step(np.zeros(4))
     assert each.render().shape == first.shape
-    assert BoxPushingEnv().render() is None
+    assert joint(PLAIN).render() is None
 
 
 @pytest.mark.skipif(importlib.util.find_spec("pygame") is None, reason="extra [human]")
 def test_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    env = gymnasium.wrappers.HumanRendering(BoxPushingEnv(render_mode="rgb_array"))
+    env = gymnasium.wrappers.HumanRendering(joint(PLAIN, render_mode="rgb_array"))
     env.reset(seed=0)
     env.step(np.zeros(4, dtype=int))
     import pygame
@@ -217,14 +233,15 @@ def test_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ({"steps": 0}, "steps = 0, must be at least 1"),
         ({"render_mode": "ansi"}, "render_mode = 'ansi', allowed"),
-        ({"settings": {"robots": 0}}, "robots"),
+        ({"robots": 0}, "robots"),
+        ({"leader": {"policy": "rule"}}, "leader"),
     ],
 )
 def test_refusals(arguments: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
-        BoxPushingEnv(**arguments)
+        environments.joint("box-pushing", **arguments)
 
 
 def test_wrong_settings_are_one_line() -> None:
     with pytest.raises(ValueError, match="robot = 4: must be a string, or must be a table"):
-        WheelsEnv({"robot": 4})
+        environments.parallel("box-pushing", robot=4)

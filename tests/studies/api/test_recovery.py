@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from nested_agents import faults
-from nested_agents.scenarios.box_pushing.environments import WheelsEnv
+from nested_agents.environments import parallel
+from nested_agents.scenarios.environments import AgentsEnv
 from nested_agents.studies.api.recovery import BLOCK, FaultCourse, returns
 
 
@@ -63,8 +64,8 @@ def test_a_fault_that_ends() -> None:
 
 
 def test_agents_of_a_parallel_environment() -> None:
-    def wheels() -> WheelsEnv:
-        return WheelsEnv({"robots": 1, "action_repeat": 2}, steps=4)
+    def wheels() -> AgentsEnv:
+        return parallel("box-pushing", 4, robots=1, action_repeat=2)
 
     env = wheels()
     policy = faults.RandomPolicy({name: env.action_space(name) for name in env.possible_agents})

@@ -15,7 +15,6 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from nested_agents.scenarios.box_pushing.world.boxes import (
-    AREA,
     BOXES,
     BoxSpec,
     box_for,
@@ -34,6 +33,8 @@ from nested_agents.scenarios.box_pushing.world.world import World
 L_SHAPE = ((0, 0), (0.2, 0), (0.2, 0.1), (0.1, 0.1), (0.1, 0.2), (0, 0.2))
 FRAME = ((0, 0), (0.2, 0), (0.2, 0.2), (0, 0.2))
 WINDOW = ((0.05, 0.05), (0.15, 0.05), (0.15, 0.15), (0.05, 0.15))
+
+AREA = 0.04
 
 
 def star(rng: np.random.Generator, corners: int) -> list[tuple[float, float]]:

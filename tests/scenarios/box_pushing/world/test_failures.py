@@ -1,4 +1,4 @@
-"""WheelFailures: what wheels do by hand, when, their effect on free motion against theory."""
+"""Failures: what wheels do by hand, when, their effect on free motion against theory."""
 
 from typing import Any
 
@@ -18,7 +18,8 @@ from nested_agents.scenarios.box_pushing.world.settings import (
     FailureSettings,
     RobotSettings,
 )
-from nested_agents.scenarios.box_pushing.world.world import WheelFailures, World
+from nested_agents.scenarios.box_pushing.world.world import World
+from nested_agents.scenarios.faults.settings import Failures
 
 WHEELS = ("robot1.left", "robot1.right", "robot2.left", "robot2.right")
 KINDS = ("seized", "free", "weak", "reversed", "stuck", "delayed", "noisy")
@@ -29,8 +30,8 @@ def failure(kind: str, wheels: str = "robot1.left", **table: Any) -> FailureSett
     return TypeAdapter(Failure).validate_python(table)
 
 
-def failures(*settings: FailureSettings) -> WheelFailures:
-    return WheelFailures(settings, WHEELS, np.full(4, 2.0))
+def failures(*settings: FailureSettings) -> Failures:
+    return Failures(settings, WHEELS, np.full(4, 2.0))
 
 
 def scenario(*settings: FailureSettings, **table: Any) -> BoxPushing:
@@ -172,7 +173,7 @@ def free_twist(robot: RobotSettings, settings: FailureSettings, speeds: FloatArr
     world = World([robot], BOXES["square"])
     world.place(np.array([[-1.0, 0.0, 0.3]]), np.zeros(3))
     agents = [f"robot1.{name}" for name in robot.wheel_names]
-    ill = WheelFailures([settings], agents, np.full(len(agents), robot.max_speed))
+    ill = Failures([settings], agents, np.full(len(agents), robot.max_speed))
     world.set_grip(ill.grip)
     for held in ill.driven(speeds, 40):
         world.advance(held, 1)
@@ -222,7 +223,7 @@ def test_free_motion_with_a_free_wheel(robot: RobotSettings) -> None:
 def test_a_noisy_wheel_does_on_average_what_it_is_told() -> None:
     robot = ROBOTS["e-puck"]
     world = World([robot], BOXES["square"])
-    ill = WheelFailures([failure("noisy", "*")], ["robot1.left", "robot1.right"], np.full(2, 0.13))
+    ill = Failures([failure("noisy", "*")], ["robot1.left", "robot1.right"], np.full(2, 0.13))
     ahead = []
     for seed in range(40):
         world.place(np.array([[-2.0, 0.0, 0.0]]), np.zeros(3))
