@@ -6,27 +6,19 @@ import json
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.words import closest, show
-from . import graphml
 from .builders import check_legible, quote
+from .graphml import node_link_table
 
 NUMBERED = re.compile(r"n?\d+")
 """Node ids that programs such as yEd and Gephi generate."""
 NODE_LINK_KEYS = ("directed", "multigraph", "graph", "nodes", "edges", "links")
 """Keys that `networkx.node_link_data` writes; ``links`` is the older name of ``edges``."""
-
-
-class Node(NamedTuple):
-    """A node of a file."""
-
-    id: object
-    label: object = None
 
 
 def read_file(path: str) -> nx.Graph | dict[str, object]:
@@ -53,10 +45,8 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
         raise ValueError(f"{path}: suffix must be .graphml, .json or .toml")
     text = sources.active().text(path)
     try:
-        if suffix == ".graphml":
-            nodes, edges, is_directed = graphml.parse(text)
-            return _graph([Node(*node) for node in nodes], edges, is_directed)
-        content = tomllib.loads(text) if suffix == ".toml" else _json(text)
+        parse = {".graphml": node_link_table, ".toml": tomllib.loads, ".json": _json}[suffix]
+        content = parse(text)
         if isinstance(content, dict) and "nodes" in content:
             return _node_link_graph(content)
         return _table_of(content)
@@ -79,7 +69,7 @@ def _json(text: str) -> object:
 
 
 def _node_link_graph(content: dict[str, object]) -> nx.Graph:
-    """Return the graph of a table in the format of `networkx.node_link_data`."""
+    """Return the graph of a table; refuse repeated nodes and edges and unknown ids."""
     for key in content:
         if key not in NODE_LINK_KEYS:
             raise ValueError(f"unknown key {quote(key)}: {closest(key, NODE_LINK_KEYS)}")
@@ -88,20 +78,29 @@ def _node_link_graph(content: dict[str, object]) -> nx.Graph:
     is_directed = _flag(content, "directed")
     if _flag(content, "multigraph"):
         raise ValueError("multigraph = true: must be false, an edge joins two agents once")
-    links = "links" if "links" in content else "edges"
     nodes = _tables(content, "nodes", ("id",))
-    edges = _tables(content, links, ("source", "target"))
-    for edge in edges:
-        if edge.get("directed", is_directed) is not is_directed:
+    ids = _distinct([node["id"] for node in nodes], "id")
+    names = dict(zip(ids, _names_of(nodes, ids), strict=True))
+    graph = nx.empty_graph(names.values(), create_using=nx.DiGraph if is_directed else nx.Graph)
+    arrow = "->" if is_directed else "-"
+    for table in _tables(content, "links" if "links" in content else "edges", ("source", "target")):
+        check_legible([table["source"], table["target"]])
+        source, target = str(table["source"]), str(table["target"])
+        edge = f"edge {quote(source)} {arrow} {quote(target)}"
+        if table.get("directed", is_directed) is not is_directed:
             raise ValueError(
-                f"edge {quote(edge['source'])} - {quote(edge['target'])} has directed = "
-                f"{show(edge['directed'])}, the graph has {show(is_directed)}: must be equal"
+                f"{edge} has directed = {show(table['directed'])}, the graph has "
+                f"{show(is_directed)}: must be equal"
             )
-    return _graph(
-        [Node(node["id"], node.get("label")) for node in nodes],
-        [(edge["source"], edge["target"]) for edge in edges],
-        is_directed,
-    )
+        for end in (source, target):
+            if end not in names:
+                raise ValueError(f"{edge}: {closest(end, ids)}, allowed: ids of nodes")
+        if source == target:
+            raise ValueError(f"{edge} leads from an agent to itself")
+        if graph.has_edge(names[source], names[target]):
+            raise ValueError(f"{edge} is given more than once")
+        graph.add_edge(names[source], names[target])
+    return graph
 
 
 def _flag(content: dict[str, object], key: str) -> bool:
@@ -124,50 +123,25 @@ def _tables(
     return listed
 
 
-def _graph(
-    nodes: list[Node], edges: Iterable[tuple[object, object]], is_directed: bool
-) -> nx.Graph:
-    """Return the graph of nodes and edges; refuse repeated nodes and edges and unknown ids."""
-    check_legible(node.id for node in nodes)
-    ids = [str(node.id) for node in nodes]
-    _refuse_repeated(ids, "id")
-    names = dict(zip(ids, _names_of(nodes), strict=True))
-    graph = nx.empty_graph(names.values(), create_using=nx.DiGraph if is_directed else nx.Graph)
-    arrow = "->" if is_directed else "-"
-    for pair in edges:
-        check_legible(pair)
-        source, target = map(str, pair)
-        edge = f"edge {quote(source)} {arrow} {quote(target)}"
-        for end in (source, target):
-            if end not in names:
-                raise ValueError(f"{edge}: {closest(end, ids)}, allowed: ids of nodes")
-        if source == target:
-            raise ValueError(f"{edge} leads from an agent to itself")
-        if graph.has_edge(names[source], names[target]):
-            raise ValueError(f"{edge} is given more than once")
-        graph.add_edge(names[source], names[target])
-    return graph
-
-
-def _names_of(nodes: list[Node]) -> list[str]:
+def _names_of(nodes: list[dict[str, object]], ids: list[str]) -> list[str]:
     """Return the names of agents: labels if all ids are numbers and nodes have labels, else ids."""
-    labeled = [node for node in nodes if node.label is not None]
-    if not labeled or not all(NUMBERED.fullmatch(str(node.id)) for node in nodes):
-        return [str(node.id) for node in nodes]
-    for node in nodes:
-        if node.label is None:
-            raise ValueError(f"node {quote(node.id)} has no label, but other nodes have one")
-    labels = [n.label.strip() if isinstance(n.label, str) else n.label for n in nodes]
-    check_legible(labels)
-    names = [str(label) for label in labels]
-    _refuse_repeated(names, "label")
-    return names
+    labels = [node.get("label") for node in nodes]
+    if not any(label is not None for label in labels) or not all(map(NUMBERED.fullmatch, ids)):
+        return ids
+    if None in labels:
+        name = quote(ids[labels.index(None)])
+        raise ValueError(f"node {name} has no label, but other nodes have one")
+    return _distinct([e.strip() if isinstance(e, str) else e for e in labels], "label")
 
 
-def _refuse_repeated(names: list[str], what: str) -> None:
+def _distinct(values: list[object], what: str) -> list[str]:
+    """Return ids or labels as text; refuse illegible and repeated ones."""
+    check_legible(values)
+    names = [str(value) for value in values]
     for name, times in Counter(names).items():
         if times > 1:
             raise ValueError(f"{what} {quote(name)} belongs to {times} nodes, allowed: one")
+    return names
 
 
 def _table_of(content: object) -> dict[str, object]:
