@@ -6,19 +6,17 @@ asked for in one place, which the protocol names.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
-from ..numerics import BoolArray, FloatArray, IntArray
+from ..numerics import BoolArray, FloatArray
 from .environments import Environments
 from .options import LeaderOptions
-from .prediction import Prediction
 from .scenario import Scenario, unwrapped
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 @runtime_checkable
@@ -129,43 +127,6 @@ class Animated(Protocol):
         ------
         ValueError
             If the settings prevent it; one line.
-        """
-
-
-class PolicyMap(ABC):
-    """Actions of a team in many situations, for display."""
-
-    @abstractmethod
-    def lines(self) -> Iterator[str]:
-        """Yield lines of text."""
-
-    @abstractmethod
-    def figure(self) -> Figure:
-        """Return a figure."""
-
-
-@runtime_checkable
-class ShowsPolicy(Protocol):
-    """The actions of a team can be shown in many situations, by ``explain``."""
-
-    def show_policy(
-        self,
-        choose: Callable[[Prediction], IntArray],
-        predict: Callable[[], Prediction],
-    ) -> PolicyMap:
-        """Return the actions of a team in many situations. The scenario starts another episode.
-
-        Parameters
-        ----------
-        choose
-            Returns the joint action ``(n,)`` that the team chooses by a prediction.
-        predict
-            Returns the team's prediction from the present state of the scenario.
-
-        Raises
-        ------
-        ValueError
-            If predictions cannot start in arbitrary states; one line.
         """
 
 

@@ -8,8 +8,7 @@ original.
 from __future__ import annotations
 
 import pickle
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from importlib import import_module
 from io import BytesIO
@@ -27,90 +26,65 @@ SHARED_TYPES = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionTyp
 """Types of objects that no step changes, which are shared, too."""
 
 
-class SimulatorCopies(ABC):
-    """A saved state of a simulator, valid until the simulator's next step."""
-
-    @abstractmethod
-    def open(self) -> AbstractContextManager[Simulator]:
-        """Return a context with a simulator in the saved state."""
+Copies = Callable[[], AbstractContextManager[Simulator]]
+"""A saved state of a simulator, valid until its next step: opens a simulator in that state."""
 
 
-def copy_simulator(simulator: Simulator) -> SimulatorCopies:
+def copy_simulator(simulator: Simulator) -> Copies:
     """Save the present state of a simulator."""
     data = getattr(simulator.env.unwrapped, "data", None)
     is_mujoco = type(data).__module__.partition(".")[0] == "mujoco"
-    return MujocoCopies(simulator) if is_mujoco else PickledCopies(simulator)
+    return _mujoco_copies(simulator) if is_mujoco else _pickled_copies(simulator)
 
 
-class PickledCopies(SimulatorCopies):
-    """Copies by pickling."""
+def _pickled_copies(simulator: Simulator) -> Copies:
+    """Return copies by pickling; layers and shared objects are stored by their identity."""
+    layers = _layers(simulator)
+    shared: dict[int, Any] = {id(layer): layer for layer in layers}
 
-    def __init__(self, simulator: Simulator) -> None:
-        self._layers = _layers(simulator)
-        file = BytesIO()
-        pickler = _Pickler(file, self._layers)
-        # By attribute, because environments that inherit EzPickle would be constructed again.
-        pickler.dump([vars(layer) for layer in self._layers])
-        self._shared = pickler.shared
-        self._saved = file.getvalue()
-
-    @contextmanager
-    def open(self) -> Iterator[Simulator]:
-        """Return a context with a new copy."""
-        copies: dict[int, Any] = {id(layer): object.__new__(type(layer)) for layer in self._layers}
-        unpickler = _Unpickler(BytesIO(self._saved), self._shared | copies)
-        for layer, attributes in zip(copies.values(), unpickler.load(), strict=True):
-            vars(layer).update(attributes)
-        yield copies[id(self._layers[0])]
-
-
-class _Pickler(pickle.Pickler):
-    """Pickles only the identity of the layers themselves and of shared objects."""
-
-    def __init__(self, file: BytesIO, layers: Iterable[object]) -> None:
-        super().__init__(file, pickle.HIGHEST_PROTOCOL)
-        self.shared: dict[int, object] = {id(layer): layer for layer in layers}
-
-    def persistent_id(self, value: object, /) -> int | None:
-        """Return the identity of a shared object; None for objects to be pickled."""
+    def identity(value: object) -> int | None:
         package = type(value).__module__.partition(".")[0]
         if isinstance(value, SHARED_TYPES) or package in SHARED_PACKAGES:
-            self.shared[id(value)] = value
-        return id(value) if id(value) in self.shared else None
+            shared[id(value)] = value
+        return id(value) if id(value) in shared else None
 
-
-class _Unpickler(pickle.Unpickler):
-    def __init__(self, file: BytesIO, shared: Mapping[int, object]) -> None:
-        super().__init__(file)
-        self._shared = shared
-
-    def persistent_load(self, identity: int, /) -> object:
-        """Return a shared object."""
-        return self._shared[identity]
-
-
-class MujocoCopies(SimulatorCopies):
-    """The MuJoCo simulator itself, restored after use."""
-
-    def __init__(self, simulator: Simulator) -> None:
-        mujoco: Any = import_module("mujoco")
-        env = simulator.env.unwrapped
-        self._simulator = simulator
-        self._env = env
-        self._attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
-        self._copy_data = mujoco.mj_copyData
-        self._saved = mujoco.MjData(env.model)
-        self._copy_data(self._saved, env.model, env.data)
+    file = BytesIO()
+    pickler: Any = pickle.Pickler(file, pickle.HIGHEST_PROTOCOL)
+    pickler.persistent_id = identity
+    # By attribute, because environments that inherit EzPickle would be constructed again.
+    pickler.dump([vars(layer) for layer in layers])
+    saved = file.getvalue()
 
     @contextmanager
-    def open(self) -> Iterator[Simulator]:
-        """Return a context with the simulator; its end restores the saved state."""
+    def copies() -> Iterator[Simulator]:
+        copied = {id(layer): object.__new__(type(layer)) for layer in layers}
+        unpickler: Any = pickle.Unpickler(BytesIO(saved))
+        unpickler.persistent_load = (shared | copied).__getitem__
+        for layer, attributes in zip(copied.values(), unpickler.load(), strict=True):
+            vars(layer).update(attributes)
+        yield copied[id(simulator)]
+
+    return copies
+
+
+def _mujoco_copies(simulator: Simulator) -> Copies:
+    """Return the simulator itself, which is restored after use."""
+    mujoco: Any = import_module("mujoco")
+    env = simulator.env.unwrapped
+    attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
+    saved = mujoco.MjData(env.model)
+    mujoco.mj_copyData(saved, env.model, env.data)
+
+    @contextmanager
+    def copies() -> Iterator[Simulator]:
         try:
-            yield self._simulator
+            yield simulator
         finally:
-            self._copy_data(self._env.data, self._env.model, self._saved)
-            for layer, values in self._attributes:
+            mujoco.mj_copyData(env.data, env.model, saved)
+            for layer, values in attributes:
                 vars(layer).update(values)
+
+    return copies
 
 
 def find_copy_fault(simulator: Simulator, actions: Mapping[Player, object]) -> str:
@@ -125,7 +99,7 @@ def find_copy_fault(simulator: Simulator, actions: Mapping[Player, object]) -> s
     try:
         copies = copy_simulator(simulator)
         for _ in range(2):
-            with copies.open() as copied:
+            with copies() as copied:
                 results.append(pickle.dumps([copied.step(actions) for _ in range(2)]))
     except Exception as error:  # raised by the environment
         return format_error(error)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from typing import Any
 
@@ -20,7 +19,7 @@ from ...core.plugins.trust import is_module_name, modules_in
 from ...core.plugins.words import near
 from ..library_types import Environment
 from .settings import EnvironmentSettings, GymnasiumSettings
-from .simulators import GymnasiumSimulator, Simulator, make_simulator
+from .simulators import Simulator, make_simulator
 
 Maker = Callable[[EnvironmentSettings, str | None], Simulator]
 """Makes a simulator from settings and a render mode."""
@@ -38,7 +37,7 @@ def find_maker(settings: EnvironmentSettings) -> Maker:
         if sources.is_reference(settings.id) or settings.id.endswith(".py"):
             loaded = sources.active().load(settings.id)
             kinds = gymnasium.Env, AECEnv, ParallelEnv
-            return FileMaker(checked_origin(settings.id, loaded, "environment", *kinds))
+            return _maker_of(checked_origin(settings.id, loaded, "environment", *kinds))
         module, colon, registered = settings.id.partition(":")
         if colon and (":" in registered or not is_module_name(module)):
             raise ValueError("must be written module:name")
@@ -49,18 +48,13 @@ def find_maker(settings: EnvironmentSettings) -> Maker:
     return make_registered
 
 
-@dataclass(frozen=True)
-class FileMaker:
-    """Makes environments from a class or function in a user's file.
+@cache
+def _maker_of(creator: Callable[..., object]) -> Maker:
+    """Return the maker of environments of a class or function in a user's file.
 
-    Makers of the same file content are equal, so that results can be cached.
+    Creators of the same file content are equal and have one maker, so that results can be cached.
     """
-
-    creator: Callable[..., object]
-
-    def __call__(self, settings: EnvironmentSettings, render_mode: str | None) -> Simulator:
-        """Return the simulator of a new environment."""
-        return _make(self.creator, settings, render_mode)
+    return partial(_make, creator)
 
 
 def make_registered(settings: EnvironmentSettings, render_mode: str | None) -> Simulator:
@@ -79,7 +73,7 @@ def _make(
         options["render_mode"] = render_mode
     try:
         simulator = make_simulator(creator(**options))
-        kind = "gymnasium" if isinstance(simulator, GymnasiumSimulator) else "pettingzoo"
+        kind = "gymnasium" if simulator.is_single else "pettingzoo"
         if (kind == "gymnasium") != isinstance(settings, GymnasiumSettings):
             raise ValueError(f"its environment is one of scenario.kind = {kind!r}")
     except Exception as error:  # raised by the environment

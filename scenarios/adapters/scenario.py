@@ -25,7 +25,7 @@ from ...core.plugins.sources import format_error, message
 from ..library_types import Environment
 from ..movies import film, save_picture
 from .actions import ActionMap
-from .copies import SimulatorCopies, copy_simulator, find_copy_fault
+from .copies import Copies, copy_simulator, find_copy_fault
 from .loading import Maker, find_maker
 from .observations import StateReader
 from .settings import EnvironmentSettings, GymnasiumSettings, PettingZooSettings
@@ -101,11 +101,8 @@ class EnvironmentScenario(Scenario):
     def lacks_prediction(self) -> str:
         """Reason why there is no prediction; empty if copies of the simulator predict."""
         predictor = self.settings.predictor
-        return (
-            ""
-            if predictor == "copy"
-            else f"scenario.predictor = {predictor!r} gives none ('copy' does)"
-        )
+        missing = f"scenario.predictor = {predictor!r} gives none ('copy' does)"
+        return "" if predictor == "copy" else missing
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode and return the states ``(n, d)``."""
@@ -224,7 +221,7 @@ class CopyPrediction(Prediction):
     def __init__(self, scenario: EnvironmentScenario, simulator: Simulator) -> None:
         self._scenario = scenario
         self._simulator = simulator
-        self._copies: SimulatorCopies | None = None
+        self._copies: Copies | None = None
         self._results: dict[bytes, tuple[FloatArray, float]] = {}
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -242,7 +239,7 @@ class CopyPrediction(Prediction):
             if self._copies is None:
                 self._copies = copy_simulator(self._simulator)
             total = 0.0
-            with self._copies.open() as simulator:
+            with self._copies() as simulator:
                 for _ in range(self._scenario.horizon):
                     result = self._scenario.play(simulator, joint_action)
                     total += float(np.mean(list(result.rewards.values())))

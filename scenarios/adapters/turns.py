@@ -25,7 +25,7 @@ from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
 from ..library_types import Data, Options, Space
-from .simulators import Player, expand_all
+from .simulators import Player
 
 
 class TurnBasedEnv(parallel_to_aec_wrapper):
@@ -126,8 +126,6 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         if self._messages.failures:
             self._messages.advance(self._joint())
         self._begin_step()
-        self.terminations = expand_all(self.terminations, self.agents)
-        self.truncations = expand_all(self.truncations, self.agents)
         return super()._deads_step_first()
 
     def observe(self, agent: str) -> FloatArray:

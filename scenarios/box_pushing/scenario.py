@@ -6,7 +6,7 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from math import degrees
 from pathlib import Path
@@ -16,7 +16,6 @@ import numpy as np
 
 from ...core.interface.environments import Transitions
 from ...core.interface.measures import Measure
-from ...core.interface.prediction import Prediction
 from ...core.interface.recording import EpisodeRecorder
 from ...core.interface.scenario import Scenario, Transition
 from ...core.interface.spaces import ActionSet
@@ -45,7 +44,6 @@ from .world.world import TOUCHING, World
 
 if TYPE_CHECKING:
     from ..movies import Pixels
-    from .pictures.policy import BoxPolicyMap
 
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
@@ -277,23 +275,6 @@ class BoxPushing(Scenario):
         from .pictures.rendering import BoxScene
 
         return BoxScene(recording).pixels(len(recording["box_pose"]) - 1)
-
-    def show_policy(
-        self,
-        choose: Callable[[Prediction], IntArray],
-        predict: Callable[[], Prediction],
-    ) -> BoxPolicyMap:
-        """Return the policy map of a team; the scenario is reset.
-
-        Raises
-        ------
-        ValueError
-            If predictions can start from the current state of the simulation only.
-        """
-        from .pictures.policy import policy_of
-
-        self.reset(0)
-        return policy_of(choose, predict(), self.world)
 
     def _save(self) -> None:
         # After every step, asked for or not, as saving costs the world its order of contacts.

@@ -1,4 +1,4 @@
-"""Trained teams explained: rules, policy and self-model, in words and figures."""
+"""Trained teams explained: rules and self-model, in words and figures."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ class StudyResults(StudyData):
         return session.scenario, session.team
 
     def explain(self, condition: str | None = None, seed: int | None = None) -> TeamExplanation:
-        """Explain a trained team: its rules in words, its policy, its self-model.
+        """Explain a trained team: its rules in words and its self-model.
 
         If the study does not keep its teams, the training is repeated and must give the same
         episodes.

@@ -1,4 +1,4 @@
-"""A trained team, explained in numbers: its value functions, policy and self-model.
+"""A trained team, explained in numbers: its value functions and self-model.
 
 A study keeps its trained teams if its spec says so. Otherwise the training is repeated and compared
 with the kept episodes. Either way, the explained team is the one that was measured.
@@ -12,11 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core.agents.fuzzy import FuzzyAgents
-from ...core.interface.abilities import PolicyMap, ShowsPolicy
-from ...core.interface.experience import Observation
-from ...core.interface.prediction import Prediction
 from ...core.interface.spaces import Variable
-from ...core.numerics import FloatArray, IntArray, pd
+from ...core.numerics import FloatArray, pd
 from ...core.values.rule_base import RuleBase
 from ..errors import SpecError, refused
 from ..store.database import columns
@@ -47,9 +44,6 @@ class Explanation:
     """State variables of the rule base."""
     parts: tuple[Parts, ...]
     """Decomposition of the value function of each agent."""
-    policy: PolicyMap | str
-    """Policy map of the scenario with ``lines()`` and ``figure()``, or the reason why there is
-    none."""
     effects: tuple[WheelEffects, ...]
     """Effects by body as the self-model estimates them; empty without one."""
 
@@ -94,7 +88,6 @@ def explain(store: Store, trial: Trial) -> Explanation:
             rules=agents.rules,
             variables=agents.space.variables,
             parts=tuple(taken[row] for row in agents.rows),
-            policy=_policy(session),
             effects=tuple(effects),
         )
 
@@ -123,30 +116,6 @@ def _kept_rows(store: Store, trial: Trial) -> list[tuple[object, ...]]:
     is_training = own["phase"].str.startswith("training")
     kept = own.loc[is_training, list(columns(store.measures()))]
     return list(kept.itertuples(index=False, name=None))
-
-
-def _policy(session: Session) -> PolicyMap | str:
-    """Return what a scenario shows of what a team does, or why it does not."""
-    agents = session.team.only(FuzzyAgents)
-    scenario = session.scenario
-    if agents.evaluator is None:
-        return "actions are drawn at random"
-    if not session.trial.settings.learner.needs_prediction:
-        return "the agents value their actions where they are, and predict nothing elsewhere"
-    nowhere: FloatArray = np.zeros((len(scenario.agents), scenario.state_space.n_variables))
-
-    def choose(prediction: Prediction) -> IntArray:
-        return session.team.act(Observation(nowhere, prediction), explore=False).joint_action
-
-    def predict() -> Prediction:
-        return agents.model.predict(session.team.observe(scenario, nowhere))
-
-    if not isinstance(scenario, ShowsPolicy):
-        return "the scenario has no method show_policy for agents such as these"
-    try:
-        return scenario.show_policy(choose, predict)
-    except ValueError as error:
-        return str(error)
 
 
 def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:

@@ -53,9 +53,7 @@ def text(explained: Explanation) -> str:
     """Return the whole explanation; agents with the same functions have one column."""
     trial = explained.trial
     lines = [f"{trial.condition}, seed {trial.seed}: the team after {trial.lengths}"]
-    lines += ["", "FUNCTIONS", "", *_functions(explained), "", "POLICY", ""]
-    policy = explained.policy
-    lines += [f"Not drawn: {policy}."] if isinstance(policy, str) else policy.lines()
+    lines += ["", "FUNCTIONS", "", *_functions(explained)]
     if explained.effects:
         lines += ["", "SELF-MODEL", "", *_self_model_lines(explained)]
     return "\n".join(line.rstrip() for text in lines for line in text.splitlines() or [""]) + "\n"
@@ -149,13 +147,11 @@ def _name_drive(drive: float) -> str:
 
 
 def draw(explained: Explanation) -> dict[str, Figure]:
-    """Return the figures of value functions and of the policy, as far as there are any."""
+    """Return the figure of the value functions, if the team has learned any."""
     drawings: dict[str, Figure] = {}
     with figures.apply_style():
         if _has_learned(explained):
             drawings["functions"] = _draw_functions(explained)
-        if not isinstance(explained.policy, str):
-            drawings["policy"] = explained.policy.figure()
     return drawings
 
 

@@ -302,7 +302,7 @@ def report(directory: Path, out: Path | None, trust: bool) -> int:
 def explain(
     directory: Path, condition: str | None, seed: int | None, full: bool, trust: bool
 ) -> int:
-    """Explain a trained team: its rules in words, its policy, its self-model.
+    """Explain a trained team: its rules in words and its self-model.
 
     DIR is the folder of the study. The text with all rules and the figures are written to its
     folder explain. Unless the study keeps its teams (keep_teams = true in its spec), the training

@@ -152,28 +152,6 @@ class EndsApart(Walkers):
         return observed, rewards, terminated, truncated, infos
 
 
-class EndsForAll(Walkers):
-    """The key __all__ ends the episode after 5 steps, as in RLlib; no agent has a flag of its own.
-
-    `which` are terminations or truncations, by their place in what a step returns.
-    """
-
-    which = 2
-
-    def step(self, actions: Any) -> Any:
-        parts = list(super().step(actions))
-        parts[2], parts[3] = {"__all__": False}, {"__all__": False}
-        parts[self.which] = {"__all__": self.t >= 5}
-        parts[4] = {"__common__": {}, **parts[4]}
-        return tuple(parts)
-
-
-class CutForAll(EndsForAll):
-    """The same, truncated."""
-
-    which = 3
-
-
 class StrayEnd(Walkers):
     """Terminations name an agent that nobody knows."""
 
@@ -449,14 +427,6 @@ class NumberedTurns(Turns):
     def __init__(self) -> None:
         super().__init__()
         self.possible_agents = [0, 1]
-
-
-class TurnsForAll(Turns):
-    """The key __all__ of truncations ends the episode after 5 steps."""
-
-    def step(self, action: Any) -> Any:
-        super().step(action)
-        self.truncations = {**self.truncations, "__all__": self.t >= 5}
 
 
 class Cart(gymnasium.Env[Any, Any]):

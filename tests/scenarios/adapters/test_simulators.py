@@ -11,9 +11,7 @@ from made_up_environments import (
     LENGTH,
     Cart,
     CartPaidInArrays,
-    CutForAll,
     EndsApart,
-    EndsForAll,
     LateButSeeing,
     MixedEnd,
     Numbered,
@@ -22,7 +20,6 @@ from made_up_environments import (
     ReusingAfterwards,
     StrayEnd,
     Turns,
-    TurnsForAll,
     Unnamed,
     Walkers,
 )
@@ -74,24 +71,6 @@ def test_an_episode_ends_when_each_has_ended_in_either_way() -> None:
     _, played = play(EndsApart())
     assert len(played) == 5
     assert (played[-1].terminated, played[-1].truncated) == (True, False)
-
-
-@pytest.mark.parametrize(
-    ("env", "terminated"), [(EndsForAll(), True), (CutForAll(), False), (TurnsForAll(), False)]
-)
-def test_the_key_for_all_ends_an_episode(env: Any, terminated: bool) -> None:
-    _, played = play(env)
-    assert len(played) == 6
-    assert (played[-1].terminated, played[-1].truncated) == (terminated, not terminated)
-    _, again = play(env)
-    assert len(again) == 6
-
-
-def test_an_agent_may_be_called_as_the_key_for_all() -> None:
-    class Called(Walkers):
-        ids = ("__all__", "b")
-
-    assert len(play(Called())[1]) == LENGTH + 1
 
 
 def test_a_flag_of_an_unknown_agent_is_refused() -> None:

@@ -6,7 +6,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from made_up_environments import CutForAll, EndsForAll
 from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, seed_test
 
@@ -170,19 +169,6 @@ def test_who_has_left_passes_nothing_down() -> None:
     assert env.observe("b").tolist() == [2] + [0] * 6
     env.step(1)
     assert env.last()[:2] == (pytest.approx([2, 0, 0, 0, 1, 0, 0]), 3.0)
-
-
-@pytest.mark.parametrize("make", [EndsForAll, CutForAll])
-def test_the_key_for_all_ends_the_turns(make: Any) -> None:
-    env = TurnBasedEnv(make())
-    env.reset(seed=0)
-    acted = 0
-    for _ in env.agent_iter(100):
-        *_, terminated, truncated, _ = env.last()
-        env.step(None if terminated or truncated else 1)
-        acted += not (terminated or truncated)
-    assert acted == 2 * 5
-    assert not env.agents
 
 
 def test_between_turns_of_a_step_nothing_is_to_be_learned() -> None:

@@ -161,7 +161,7 @@ def test_a_trained_team_is_explained_and_played(tmp_path) -> None:
     study = na.run(spec, tmp_path, jobs=1, progress=False)
     explained = study.explain()
     assert "The unit is that of the return" in " ".join(explained.text.split())
-    assert "policy" in explained.figures
+    assert "functions" in explained.figures
     assert explained._repr_html_().startswith("<pre>default, seed 0")
     html = study.replay()._repr_html_()
     assert html.startswith("<img alt='default, seed 0, last episode' src='data:image/gif;base64,")
