@@ -6,9 +6,9 @@ situation, and prediction, with many. It must not depend on anything else, which
 check`` verifies. Each scenario defines its view and a registry of its built-in variables.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -23,17 +23,7 @@ StateFunction = Callable[[Any, Any], Any]
 values ``(m,)`` in ``m`` situations, or one number if it is compiled."""
 
 
-@dataclass(frozen=True)
-class Situations(ABC):
-    """Base class of views: ``m`` situations of a scenario."""
-
-    @property
-    @abstractmethod
-    def n_situations(self) -> int:
-        """Number of situations."""
-
-
-SituationsT = TypeVar("SituationsT", bound=Situations)
+ViewT = TypeVar("ViewT")
 
 
 @dataclass(frozen=True)
@@ -48,17 +38,6 @@ class StateVariable:
     """Whether it is the same for all bodies."""
     trusted: bool = False
     """Whether it is built in, so that its values are not checked."""
-
-    def __call__(self, view: Situations, body: int) -> FloatArray:
-        """Return the values ``(m,)`` for a body.
-
-        Raises
-        ------
-        ValueError
-            If a function that is not trusted returns anything but a finite number per situation.
-        """
-        values: FloatArray = self.function(view, body)
-        return values if self.trusted else self.checked(values, view.n_situations)
 
     def checked(self, returned: object, m: int) -> FloatArray:
         """Return the values that a user's function gave for ``m`` situations.
@@ -104,11 +83,13 @@ def freeze(array: FloatArray) -> FloatArray:
     return array
 
 
-def guard(view: SituationsT) -> SituationsT:
-    """Return a copy of a view with read-only arrays."""
-    held = {field.name: vars(view)[field.name] for field in fields(view)}
-    arrays = {k: freeze(v.view()) for k, v in held.items() if isinstance(v, np.ndarray)}
-    return replace(view, **arrays)
+def guard(view: ViewT) -> ViewT:
+    """Return a copy of a dataclass with read-only arrays."""
+    held = vars(view).items()
+    arrays = {k: freeze(v.view()) for k, v in held if isinstance(v, np.ndarray)}
+    guarded = copy(view)
+    vars(guarded).update(arrays)
+    return guarded
 
 
 def state_variable(

@@ -215,10 +215,11 @@ def build(
         if not agents:
             raise ValueError("no agents")
         if bodies is not None:
-            named = _named(agents, bodies)
+            named = _names_at(agents, bodies, "bodies")
+            check_names([name for body in named for name in body], agents, "bodies")
         if interactions is not None and dict(settings).get("shape") == "scenario":
-            pairs = _pairs(agents, interactions)
-            settings = settings.model_copy(update={"edges": pairs})
+            pairs = _names_at(agents, interactions, "interactions")
+            settings = settings.model_copy(update={"edges": tuple(pairs)})
         if settings.kind in TOPOLOGIES.built_in:
             graph = settings.build(agents, named)
         else:
@@ -297,30 +298,14 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
     return settings
 
 
-def _named(agents: Names, bodies: Sequence[Sequence[int]]) -> Bodies:
-    """Return the names of agents by body, from their indices; refuse other values."""
+def _names_at(agents: Names, groups: Sequence[Sequence[int]], key: str) -> Bodies:
+    """Return the names of agents in groups of their indices; refuse other values."""
     indices = range(len(agents))
     try:
-        named = [[agents[indices.index(i)] for i in body] for body in bodies]
+        return [tuple(agents[indices.index(i)] for i in group) for group in groups]
     except (TypeError, ValueError):
-        allowed = f"agent indices by body, 0 to {len(agents) - 1}"
-        raise ValueError(f"bodies = {quote(bodies)}: must be {allowed}") from None
-    check_names([name for body in named for name in body], agents, "bodies")
-    return named
-
-
-def _pairs(agents: Names, interactions: Sequence[Sequence[int]]) -> tuple[tuple[str, str], ...]:
-    """Return pairs of names for pairs of indices; refuse other values."""
-    indices = range(len(agents))
-    named = []
-    for k, pair in enumerate(interactions):
-        try:
-            first, second = (agents[indices.index(i)] for i in pair)
-        except (TypeError, ValueError):
-            allowed = f"pairs of agent indices, 0 to {len(agents) - 1}"
-            raise ValueError(f"interactions[{k}] = {quote(pair)}: must be {allowed}") from None
-        named.append((first, second))
-    return tuple(named)
+        allowed = f"groups of agent indices, 0 to {len(agents) - 1}"
+        raise ValueError(f"{key} = {quote(groups)}: must be {allowed}") from None
 
 
 def _arguments(kind: str, text: str) -> Keys:

@@ -72,35 +72,28 @@ class ActionMap:
             [np.resize(values, n_actions) for table in tables.values() for values in table]
         )
         ends = np.cumsum([len(table) for table in tables.values()]).tolist()
-        bodies = [
-            range(end - len(table), end) for end, table in zip(ends, tables.values(), strict=True)
-        ]
+        starts = [0, *ends[:-1]]
+        bodies = [tuple(range(*span)) for span in zip(starts, ends, strict=True)]
         self._members = dict(zip(spaces, bodies, strict=True))
         self.players = list(spaces)
-        self.groups = tuple(tuple(body) for body in bodies)
+        self.groups = tuple(bodies)
         if len(spaces) == 1:
             self.groups = _checked_groups(groups, len(self._values))
             self.players *= len(self.groups)
-        self.names = self._agent_names(bool(groups))
+        prefixes, named = list(map(str, spaces)), tuple(bodies)
+        if SINGLE in spaces:
+            kind, named = "body" if groups else "actuator", self.groups
+            prefixes = [f"{kind}{b}" for b in range(1, len(named) + 1)]
+        self.names = tuple(
+            prefix if len(body) == 1 and not groups else f"{prefix}.{k}"
+            for prefix, body in zip(prefixes, named, strict=True)
+            for k in range(1, len(body) + 1)
+        )
         if len(set(self.names)) < len(self.names):
             raise ValueError(f"agents {', '.join(self.names)}: their names must differ")
         has_bodies = len(spaces) > 1 or bool(groups)
         self.roles = tuple(map(_role, self.names)) if has_bodies else self.names
         self.action_set = self._action_set(neutral)
-
-    def _agent_names(self, has_groups: bool) -> tuple[str, ...]:
-        if has_groups:
-            numbered = enumerate(self.groups, 1)
-            return tuple(f"body{b}.{k + 1}" for b, body in numbered for k in range(len(body)))
-        if SINGLE in self._spaces:
-            return tuple(f"actuator{k + 1}" for k in range(len(self._values)))
-        names: list[str] = []
-        for player, members in self._members.items():
-            single = [str(player)]
-            names += (
-                single if len(members) == 1 else [f"{player}.{k + 1}" for k in range(len(members))]
-            )
-        return tuple(names)
 
     def _action_set(self, neutral: int | None) -> ActionSet:
         n_actions = self._values.shape[1]

@@ -66,11 +66,6 @@ class ObservationEntries:
                 raise ValueError(f"{self._name}: {count} numbers are named {name}, rename a key")
         self.bounds = self._bounds()
 
-    @property
-    def keys(self) -> list[str]:
-        """Keys of a Dict observation; empty for other spaces."""
-        return list(map(str, self.space)) if isinstance(self.space, Dict) else []
-
     def _bounds(self) -> FloatArray:
         if isinstance(self.space, Discrete):
             first = float(self.space.start)

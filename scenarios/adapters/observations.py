@@ -70,27 +70,20 @@ class StateReader:
         for rows in self._places.values():
             self._is_read[self._player, rows] = True
         explored = cache(lambda: explore(self.numbers))
-        described = [self._variable(name, explored) for name in self._places]
+        described = (self._variable(name, explored) for name in self._places)
         self.variables = tuple(variable for variable in described if variable is not None)
         names = [variable.name for variable in self.variables]
         self._check_names(names)
         if not self.variables:
             raise ValueError("observation: all of its numbers are constant in random episodes")
-        kept = [self._places[name] for name in names]
-        is_common = [bool((rows == rows[:, :1]).all()) for rows in kept]
-        is_single = len(spaces) == 1
-        pairs = zip(names, is_common, strict=True)
-        self.common = tuple(name for name, same in pairs if same and is_single)
+        self.common: tuple[str, ...] = ()
+        if len(spaces) == 1:
+            rows = {name: self._places[name] for name in names}
+            self.common = tuple(name for name, at in rows.items() if (at == at[:, :1]).all())
 
     def _common_names(self) -> list[str]:
         """Return the names of the numbers that all players observe, in the order of the first."""
         first, *others = self._entries
-        for other in others:
-            if set(other.keys) != set(first.keys):
-                raise ValueError(
-                    f"observation: keys of {first.player} are {', '.join(first.keys) or 'none'}, "
-                    f"of {other.player} {', '.join(other.keys) or 'none'}, allowed: the same keys"
-                )
         shared = set(first.names).intersection(*(other.names for other in others))
         if not self._settings.variables and any(set(e.names) != shared for e in self._entries):
             raise ValueError(
@@ -101,21 +94,12 @@ class StateReader:
     def _find_variables(self) -> dict[str, IntArray]:
         """Return the columns of each variable ``(1, bodies)``; ``(2, bodies)`` for cos and sin."""
         settings = self._settings
-        angles = {
-            name: self._find(f"angles.{name}", entries) for name, entries in settings.angles.items()
+        angles = {name: self._find(f"angles.{name}", e) for name, e in settings.angles.items()}
+        used = {int(i) for rows in angles.values() for i in rows.ravel()}
+        named = settings.variables or {
+            name: i for i, name in enumerate(self._names) if i not in used
         }
-        places = {
-            name: self._find(f"variables.{name}", entries)
-            for name, entries in settings.variables.items()
-        }
-        if not settings.variables:
-            used = {int(i) for rows in angles.values() for i in rows.ravel()}
-            n_bodies = len(self._player)
-            places = {
-                name: np.full((1, n_bodies), i)
-                for i, name in enumerate(self._names)
-                if i not in used
-            }
+        places = {name: self._find(f"variables.{name}", entry) for name, entry in named.items()}
         for name in angles.keys() & places.keys():
             raise ValueError(f"scenario.angles.{name}: another state variable has this name")
         return places | angles
@@ -158,9 +142,8 @@ class StateReader:
     def _range(self, bounds: FloatArray, name: str) -> tuple[float, float]:
         """Return the bounds ``(players, 2, k)`` of a variable over all bodies."""
         rows = self._places[name]
-        low = bounds[self._player, 0, rows].min()
-        high = bounds[self._player, 1, rows].max()
-        return float(low), float(high)
+        low, high = (bounds[self._player, end, rows] for end in (0, 1))
+        return float(low.min()), float(high.max())
 
     def _bounds_of(self, name: str) -> tuple[float, float]:
         """Return the bounds by the spaces; infinite if the settings give a range."""
@@ -171,16 +154,10 @@ class StateReader:
         return low - margin, high + margin
 
     def _check_names(self, names: Sequence[str]) -> None:
-        settings = self._settings
-        success = settings.success if isinstance(settings.success, dict) else {}
-        tables = {
-            "ranges": settings.ranges.keys(),
-            "centers": settings.centers.keys(),
-            "success": success.keys() - {"return"},
-        }
-        for key, used in tables.items():
-            for name in used:
-                if name not in names:
+        for key in ("ranges", "centers", "success"):
+            table = dict(self._settings)[key]
+            for name in table if isinstance(table, dict) else ():
+                if name not in names and (key, name) != ("success", "return"):
                     known = ", ".join(names)
                     raise ValueError(
                         f"scenario.{key}.{name}: no such state variable, known: {known}"

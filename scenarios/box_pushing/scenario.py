@@ -28,18 +28,19 @@ from .measurements import MEASURES, ORIENTATION
 from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap
 from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
-from .prediction.predictors import ExactPrediction, Future, push_model
+from .prediction.predictors import ExactPrediction, push_model
 from .prediction.settings import BeliefSettings
 from .prediction.twists import mean_twists
 from .states.kernel import progress_of
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
 from .world.boxes import box_for, growth
+from .world.polygons import UNIT
 from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD
 from .world.starts import place
-from .world.stepping import step_address
+from .world.stepping import advance_many, step_address
 from .world.world import TOUCHING, World
 
 if TYPE_CHECKING:
@@ -243,10 +244,8 @@ class BoxPushing(Scenario):
         )
         if self._playground is None or self._saved is None:
             return BoxPrediction(situation, self._model, self._prediction)
-        future = Future(
-            self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
-        )
-        return ExactPrediction(situation, self._model, self._prediction, future)
+        future = self._playground, self._saved, self._failures, self._step
+        return ExactPrediction(situation, self._model, self._prediction, *future)
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return an equal scenario that predicts one decision period by simulation."""
@@ -391,8 +390,15 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
         one = self.scenario
         before = self._boxes
         self._speeds = one.commanded(self._speeds, joint_actions)
-        poses, gaps, readings = one.world.advance_many(
-            self._addresses, self._speeds, one.settings.action_repeat, self._last, self._wrenches
+        periods, speeds = one.settings.action_repeat, self._speeds * UNIT
+        poses, gaps, readings = advance_many(
+            one.world.physics,
+            one.world.sensors,
+            self._addresses,
+            speeds,
+            periods,
+            self._last,
+            self._wrenches,
         )
         batch = one.situations(poses, gaps, before)
         self._boxes = np.ascontiguousarray(poses[:, 0])

@@ -234,47 +234,36 @@ def _cost(path: Path, pose: Pose, place: Pose) -> float:
     return left + 2.0 * abs(off) + 20.0 * too_near + 0.06 * turn
 
 
-@njit(cache=True, forceinline=True)
-def _command(wheels: Wheels, speeds: FloatArray, action: int, wheel: int) -> float:
-    """Return the next speed of a wheel [m/s]."""
-    wanted = wheels.gains[action, wheel] * speeds[wheel] + wheels.increments[action, wheel]
-    return min(max(wanted, -wheels.limit), wheels.limit)
-
-
 @njit(cache=True)
-def _moved(wheels: Wheels, pose: Pose, speeds: FloatArray, action: int, out: FloatArray) -> Pose:
-    """Return the pose after a decision period, and write the wheel speeds to `out`."""
-    ahead, left, turn = wheels.effect[0, -1], wheels.effect[1, -1], wheels.effect[2, -1]
-    for w in range(len(speeds)):
-        out[w] = _command(wheels, speeds, action, w)
-        ahead += wheels.effect[0, w] * out[w]
-        left += wheels.effect[1, w] * out[w]
-        turn += wheels.effect[2, w] * out[w]
-    dx, dy, turned = displacement(pose[2], (ahead, left, turn), wheels.period)
-    return pose[0] + dx, pose[1] + dy, pose[2] + turned
+def _options(wheels: Wheels, speeds: FloatArray, actions: IntArray, after: FloatArray) -> int:
+    """Write the actions that lead to different wheel speeds, and these speeds; return their number.
 
-
-@njit(cache=True)
-def _same(wheels: Wheels, speeds: FloatArray, action: int, other: int) -> bool:
-    """Return whether two actions lead to the same wheel speeds."""
-    for w in range(len(speeds)):
-        if _command(wheels, speeds, action, w) != _command(wheels, speeds, other, w):
-            return False
-    return True
-
-
-@njit(cache=True)
-def _distinct(wheels: Wheels, speeds: FloatArray, out: IntArray) -> IntArray:
-    """Return the actions, in `out`, except those that repeat the speeds of an earlier one."""
+    Of actions with equal speeds the first is written.
+    """
     count = 0
     for action in range(len(wheels.gains)):
         is_new = True
+        for w in range(len(speeds)):
+            wanted = wheels.gains[action, w] * speeds[w] + wheels.increments[action, w]
+            after[count, w] = min(max(wanted, -wheels.limit), wheels.limit)
         for k in range(count):
-            is_new &= not _same(wheels, speeds, action, out[k])
+            is_new &= not np.array_equal(after[k], after[count])
         if is_new:
-            out[count] = action
+            actions[count] = action
             count += 1
-    return out[:count]
+    return count
+
+
+@njit(cache=True)
+def _moved(wheels: Wheels, pose: FloatArray, speeds: FloatArray) -> Pose:
+    """Return the pose after a decision period with wheel speeds."""
+    ahead, left, turn = wheels.effect[0, -1], wheels.effect[1, -1], wheels.effect[2, -1]
+    for w in range(len(speeds)):
+        ahead += wheels.effect[0, w] * speeds[w]
+        left += wheels.effect[1, w] * speeds[w]
+        turn += wheels.effect[2, w] * speeds[w]
+    dx, dy, turned = displacement(pose[2], (ahead, left, turn), wheels.period)
+    return pose[0] + dx, pose[1] + dy, pose[2] + turned
 
 
 @njit(cache=True)
@@ -304,14 +293,13 @@ def _search(
     """
     n_actions = len(wheels.gains)
     trail = np.empty((DEPTH + 1, 3))
-    reached = np.empty((DEPTH + 1, len(speeds)))
     costs = np.zeros(DEPTH + 1)
     actions = np.empty((DEPTH, n_actions), np.int64)
+    after = np.empty((DEPTH, n_actions, len(speeds)))
     counts = np.empty(DEPTH, np.int64)
     tried = np.zeros(DEPTH, np.int64)
     trail[0] = pose
-    reached[0] = speeds
-    counts[0] = len(_distinct(wheels, speeds, actions[0]))
+    counts[0] = _options(wheels, speeds, actions[0], after[0])
     best = np.inf
     best_action = 0
     best_trail = trail[1:]
@@ -320,22 +308,21 @@ def _search(
         if tried[level] == counts[level]:
             level -= 1
             continue
-        action = actions[level, tried[level]]
+        reached = after[level, tried[level]]
         tried[level] += 1
-        start = (trail[level, 0], trail[level, 1], trail[level, 2])
-        after = _moved(wheels, start, reached[level], action, reached[level + 1])
-        near = _crowding(after[0], after[1], others.plans[level], others.near, others.span)
+        x, y, heading = _moved(wheels, trail[level], reached)
+        near = _crowding(x, y, others.plans[level], others.near, others.span)
         cost = costs[level] + 10.0 * near
         if cost >= best:
             continue
         is_last = level == DEPTH - 1
-        cost += (1.1 if is_last else 0.1) * _cost(path, after, place)
-        trail[level + 1, 0], trail[level + 1, 1], trail[level + 1, 2] = after
+        cost += (1.1 if is_last else 0.1) * _cost(path, (x, y, heading), place)
+        trail[level + 1, 0], trail[level + 1, 1], trail[level + 1, 2] = x, y, heading
         if not is_last:
             level += 1
             costs[level] = cost
             tried[level] = 0
-            counts[level] = len(_distinct(wheels, reached[level], actions[level]))
+            counts[level] = _options(wheels, reached, actions[level], after[level])
         elif cost < best:
             best = cost
             best_action = actions[0, tried[0] - 1]

@@ -34,57 +34,35 @@ def faults_of_prediction(
     prediction = scenario.predict()
     if prediction is None:
         return
-    unchanged = joint_actions.copy()
-    faults = [*_misformed(scenario, prediction, joint_actions)]
-    if not np.array_equal(joint_actions, unchanged):
+    given = joint_actions.copy()
+    n, m = joint_actions.T.shape
+    space, groups = scenario.state_space, scenario.groups
+    each = [prediction.states(i, given) for i in range(n)]
+    own, shared = states_by_group(prediction, given, groups, space.n_own)
+    rewards = prediction.rewards(given)
+    if not np.array_equal(joint_actions, given):
         yield "the joint actions that are to be predicted are changed"
-    yield from faults
-    states = np.array([prediction.states(i, unchanged) for i in range(len(scenario.agents))])
-    for i in range(len(states)):
-        if differs(scenario, prediction.states(i, unchanged[-1:])[0], states[i, -1]).any():
-            yield f"states of agent {i} after a joint action depend on those predicted with it"
-    yield from faults_of_sharing(scenario, states)
-    yield from _wrong_groups(scenario, prediction, unchanged, states)
-    yield from _wrong_equivalents(scenario, prediction, unchanged, states)
-    yield from _own_variable_moved(scenario, prediction, unchanged, rng)
-
-
-def _misformed(
-    scenario: Scenario, prediction: Prediction, joint_actions: IntArray
-) -> Iterator[str]:
-    """Yield predictions with a wrong shape, or that are not finite."""
-    n = len(scenario.agents)
-    m = len(joint_actions)
-    d = scenario.state_space.n_variables
-    groups = scenario.groups
-    n_own = scenario.state_space.n_own
-    wanted: dict[str, tuple[FloatArray, tuple[int, ...]]] = {
-        f"states of agent {i}": (prediction.states(i, joint_actions), (m, d)) for i in range(n)
-    }
-    own, shared = states_by_group(prediction, joint_actions, groups, n_own)
-    wanted["own variables of all agents"] = own, (n, m, n_own)
-    wanted["shared variables of all groups"] = shared, (len(groups), m, d - n_own)
-    rewards = prediction.rewards(joint_actions)
-    if rewards is not None:
-        wanted["rewards"] = rewards, (m,)
+    wanted = {f"states of agent {i}": (each[i], (m, space.n_variables)) for i in range(n)}
+    wanted["own variables of all agents"] = own, (n, m, space.n_own)
+    n_shared = space.n_variables - space.n_own
+    wanted["shared variables of all groups"] = shared, (len(groups), m, n_shared)
+    wanted["rewards"] = np.zeros(m) if rewards is None else rewards, (m,)
     for name, (value, shape) in wanted.items():
         if np.shape(value) != shape:
             yield f"predicted {name} of shape {np.shape(value)}, must be {shape}"
         if not np.isfinite(value).all():
             yield f"predicted {name} are not finite"
-
-
-def _wrong_groups(
-    scenario: Scenario, prediction: Prediction, joint_actions: IntArray, states: FloatArray
-) -> Iterator[str]:
-    """Yield differences between the predictions of all agents and of each agent."""
-    groups = scenario.groups
-    own, shared = states_by_group(prediction, joint_actions, groups, scenario.state_space.n_own)
+    states = np.array(each)
+    for i in range(n):
+        if differs(scenario, prediction.states(i, joint_actions[-1:])[0], states[i, -1]).any():
+            yield f"states of agent {i} after a joint action depend on those predicted with it"
+    yield from faults_of_sharing(scenario, states)
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     wrong = differs(scenario, np.concatenate([own, shared[body]], axis=2), states)
     for agent, _, j in np.argwhere(wrong):
-        name = scenario.state_space.variables[j].name
-        yield f"states_by_group and states differ in {name} of agent {agent}"
+        yield f"states_by_group and states differ in {space.variables[j].name} of agent {agent}"
+    yield from _wrong_equivalents(scenario, prediction, joint_actions, states)
+    yield from _own_variable_moved(scenario, prediction, joint_actions, rng)
 
 
 def _wrong_equivalents(
@@ -102,14 +80,14 @@ def _wrong_equivalents(
     replaced = joint_actions.copy()
     for group, equivalent in zip(scenario.groups, alike, strict=True):
         members = list(group)
-        digits = (n_actions,) * len(members)
-        first = equivalent[: n_actions ** len(members)]
-        in_order = (first >= 0) & (first <= np.arange(len(first)))
-        if not (in_order.all() and (first[first] == first).all()):
+        places = n_actions ** np.arange(len(members))[::-1]
+        first = equivalent[: n_actions * places[0]]
+        is_earlier = (first >= 0) & (first <= np.arange(len(first)))
+        if not is_earlier.all() or (first[first] != first).any():
             yield "alike must hold the first equivalent robot-action index of each index"
             return
-        actions = np.ravel_multi_index(tuple(joint_actions[:, members].T), digits)
-        replaced[:, members] = np.stack(np.unravel_index(first[actions], digits), axis=-1)
+        actions = first[joint_actions[:, members] @ places]
+        replaced[:, members] = actions[:, None] // places % n_actions
     for agent, expected in enumerate(states):
         wrong = differs(scenario, prediction.states(agent, replaced), expected)
         for row, j in np.argwhere(wrong):
@@ -130,15 +108,11 @@ def state_differences(scenario: Scenario, states: FloatArray, others: FloatArray
     return differences
 
 
-def is_close(differences: FloatArray, expected: FloatArray) -> BoolArray:
-    """Return whether differences from expected values are within rounding."""
-    close: BoolArray = np.abs(differences) <= TOLERANCE * np.maximum(1.0, np.abs(expected))
-    return close
-
-
 def differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
     """Return whether states ``(..., d)`` differ by more than rounding."""
-    return ~is_close(state_differences(scenario, np.asarray(states), expected), expected)
+    differences = np.abs(state_differences(scenario, np.asarray(states), expected))
+    far: BoolArray = ~(differences <= TOLERANCE * np.maximum(1.0, np.abs(expected)))
+    return far
 
 
 def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:

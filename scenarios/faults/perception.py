@@ -64,29 +64,27 @@ class PerceivedScenario(ScenarioWrapper):
 
     def __init__(self, scenario: Scenario, settings: Sequence[PerceptionSettings]) -> None:
         super().__init__(scenario)
+        groups = scenario.groups
         n = len(self.agents)
-        self._noise = np.zeros(n)
+        noise = np.zeros(n)
         self._delays = np.zeros(n, dtype=np.int64)
-        lost = np.zeros((n, len(scenario.groups)), dtype=bool)
+        body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+        others = body[:, None] != np.arange(len(groups))
+        lost = np.zeros(others.shape, dtype=bool)
         distances = distances_of(scenario)
         for i, one in enumerate(settings):
             key = f"scenario.perception[{i}]"
             mask = mask_of(one.agents, self.agents, f"{key}.agents")
-            self._noise[mask] = np.maximum(self._noise[mask], one.noise)
+            noise[mask] = np.maximum(noise[mask], one.noise)
             self._delays[mask] = np.maximum(self._delays[mask], one.delay)
-            if one.lost:
-                named = mask_of(one.lost, self.agents, f"{key}.lost")
-                lost |= np.outer(mask, [named[list(group)].any() for group in scenario.groups])
-            if one.reach is not None:
-                lost[mask] |= distances[mask] > one.reach
-        bodies = len(scenario.groups)
-        body = np.repeat(np.arange(bodies), [len(group) for group in scenario.groups])
-        own = body[:, None] == np.arange(bodies)
-        self.perceived: BoolArray = ~own & ~lost
+            named = mask_of(one.lost, self.agents, f"{key}.lost")
+            lost |= np.outer(mask, [named[list(group)].any() for group in groups])
+            lost[mask] |= distances[mask] > (np.inf if one.reach is None else one.reach)
+        self.perceived: BoolArray = others & ~lost
         # Agents that each agent assumes to take the neutral action
-        self._unperceived = [np.flatnonzero(~(own | self.perceived)[i][body]) for i in range(n)]
+        self._unperceived = [np.flatnonzero(row[body]) for row in others & lost]
         self._low, width = self.state_space.ranges
-        self._scale = self._noise[:, None] * width
+        self._scale = noise[:, None] * width
         self._width = width
         self._periodic = np.array([v.periodic for v in self.state_space.variables])
         self._past: list[FloatArray] = []
@@ -126,9 +124,7 @@ class PerceivedScenario(ScenarioWrapper):
 
     def _perceive(self, states: FloatArray) -> FloatArray:
         """Return the state that each agent perceives of itself, and store the true states."""
-        self._past = [*self._past[-int(self._delays.max()) :], states.copy()]
-        if not self._delays.any():
-            self._past = self._past[-1:]
+        self._past = [*self._past, states.copy()][-1 - int(self._delays.max()) :]
         # The count of draws does not depend on the settings, so that runs stay paired.
         self._drawn = self._rng.standard_normal(states.shape) * self._scale
         own = [self._past[-1][i] + self.offsets(i)[i] for i in range(len(states))]

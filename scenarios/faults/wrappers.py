@@ -26,9 +26,8 @@ From episode 3 on, the motor of a pendulum executes a third of its command.
 ({}, array([0.66], dtype=float32))
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import gymnasium
 import numpy as np
@@ -165,7 +164,7 @@ INEXPRESSIBLE: Mapping[Commands, str] = {"effort": "seized", "velocity": "free",
 """Kind of fault that no action can express, by the meaning of actions."""
 
 
-class _Faulty(ABC):
+class _Faulty:
     """Base class of the wrappers: an environment with scheduled faults.
 
     Names of actuators begin with the prefix of their action space. Random numbers follow from
@@ -182,16 +181,14 @@ class _Faulty(ABC):
 
     def __init__(
         self,
-        env: Environment,
+        scales: Mapping[str, ActionScale],
         faults: Sequence[ActuatorFault],
         *,
         seed: int = 0,
         commands: Commands = "effort",
-        rest: object = None,
         mechanism: Mechanism | None = None,
         inform: bool = False,
     ) -> None:
-        self._wrap(env)
         if commands not in INEXPRESSIBLE:
             raise ValueError(f"commands = {commands!r}, allowed: {', '.join(INEXPRESSIBLE)}")
         for i, fault in enumerate(faults):
@@ -202,7 +199,7 @@ class _Faulty(ABC):
                 )
         self._parts: dict[str, tuple[ActionScale, slice]] = {}
         names: list[str] = []
-        for prefix, scale in self._scales(env, rest).items():
+        for prefix, scale in scales.items():
             self._parts[prefix] = scale, slice(len(names), len(names) + len(scale.limits))
             names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale.limits))]
         self.actuators = tuple(names)
@@ -215,14 +212,6 @@ class _Faulty(ABC):
         self._hooked = False
         self.carried: Data = None
         self._begin(0, 0)
-
-    @abstractmethod
-    def _wrap(self, env: Environment) -> None:
-        """Initialize the base class of the library."""
-
-    @abstractmethod
-    def _scales(self, env: Environment, rest: Data) -> dict[str, ActionScale]:
-        """Return the scales of the action spaces by the prefix of their actuators."""
 
     def reset(self, seed: int | None = None, options: Options = None) -> Data:
         """Start an episode; a seed resets the episode count.
@@ -321,11 +310,16 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         If a fault names no actuator or cannot be expressed, or the action space is not supported.
     """
 
-    def _wrap(self, env: Environment) -> None:
+    def __init__(
+        self,
+        env: Environment,
+        faults: Sequence[ActuatorFault],
+        *,
+        rest: ArrayLike | None = None,
+        **options: Any,
+    ) -> None:
         gymnasium.Wrapper.__init__(self, env)
-
-    def _scales(self, env: Environment, rest: Data) -> dict[str, ActionScale]:
-        return {"": ActionScale(env.action_space, rest)}
+        _Faulty.__init__(self, {"": ActionScale(env.action_space, rest)}, faults, **options)
 
     def step(self, action: ArrayLike) -> tuple[Data, Data, bool, bool, dict[str, object]]:
         """Execute an action with faulty actuators."""
@@ -357,15 +351,21 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         The last executed actions, by agent.
     """
 
-    def _wrap(self, env: Environment) -> None:
+    def __init__(
+        self,
+        env: Environment,
+        faults: Sequence[ActuatorFault],
+        *,
+        rest: Mapping[str, ArrayLike] | None = None,
+        **options: Any,
+    ) -> None:
         BaseParallelWrapper.__init__(self, env)
-
-    def _scales(self, env: Environment, rest: Data) -> dict[str, ActionScale]:
         rests = rest or {}
-        return {
+        scales = {
             agent: ActionScale(env.action_space(agent), rests.get(agent), f"action space {agent}")
             for agent in env.possible_agents
         }
+        _Faulty.__init__(self, scales, faults, **options)
 
     def step(self, actions: Mapping[str, ArrayLike]) -> tuple[dict[str, Data], ...]:
         """Execute the agents' actions with faulty actuators."""

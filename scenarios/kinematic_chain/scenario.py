@@ -25,9 +25,10 @@ from ...core.plugins.words import expect
 from ...core.search.best_response import RespondingPrediction, Responses, Search
 from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
+from ..state_variables import find_variable, space_of
 from .config import PERIOD, REACH, SIMPLE, KinematicChainSettings
 from .responses import Options, piecewise_linear, respond
-from .variables import ChainStates, ChainView, forward_kinematics
+from .variables import CHAIN_VARIABLES, SPEED, ChainView, forward_kinematics, joint_states
 
 MEASURES = (
     SUCCESS,
@@ -75,8 +76,9 @@ class KinematicChain(Scenario):
         self._limits = np.full(n, settings.top_speed)
         self._max_angles = np.full(n, settings.joint_limit or np.inf)
         self._max_angles[0] = np.inf
-        self._states = ChainStates(settings.state_space)
-        self.state_space = self._states.space
+        names = settings.state_space
+        self._variables = [find_variable(CHAIN_VARIABLES, name) for name in names]
+        self.state_space = space_of("+".join(names), SPEED, self._variables)
         self.nominal_effects = (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * n
         """Effect of a joint's speed on its twist ``(3, 2)``: it only turns."""
         self.constants: tuple[str, ...] = ()
@@ -214,7 +216,7 @@ class KinematicChain(Scenario):
         fractions = self._speeds[:, None] / self.settings.top_speed
         places = self._places()[:, None]
         view = ChainView(places, self._angles[:, None], fractions, self._goal, before)
-        return self._states.of_joints(view, 0, len(self.agents))[:, 0]
+        return joint_states(view, self._variables, 0, len(self.agents))[:, 0]
 
 
 class ChainEnvironments(StackedEnvironments[KinematicChain]):
@@ -253,7 +255,7 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
             goal=self._goals,
             previous_distance=self._distance,
         )
-        states = arm._states.of_joints(view, 0, self._angles.shape[1]).transpose(1, 0, 2)
+        states = joint_states(view, arm._variables, 0, self._angles.shape[1]).transpose(1, 0, 2)
         rewards = arm._reward(view.distance, view.approach)
         self._distance = view.distance.copy()
         terminated = view.distance < settings.tolerance
@@ -329,11 +331,12 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        return self.arm._states.of_joints(self.view_after(joint_actions), agent, 1)[0]
+        return joint_states(self.view_after(joint_actions), self.arm._variables, agent, 1)[0]
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the speeds ``(n, m, 1)`` and the other variables ``(n, m, d - 1)`` of all."""
-        states = self.arm._states.of_joints(self.view_after(joint_actions), 0, len(self.angles))
+        view = self.view_after(joint_actions)
+        states = joint_states(view, self.arm._variables, 0, len(self.angles))
         return states[:, :, :1], states[self._joints, :, 1:]
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:

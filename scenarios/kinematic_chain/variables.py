@@ -29,12 +29,9 @@ from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray
 from ...core.plugins.registry import Registry
 from ..state_variables import (
-    Situations,
     StateVariable,
-    find_variable,
     freeze,
     guard,
-    space_of,
     state_variable,
 )
 
@@ -43,7 +40,7 @@ Joints = int | slice
 
 
 @dataclass(frozen=True)
-class ChainView(Situations):
+class ChainView:
     """The arm in ``m`` situations."""
 
     places: FloatArray
@@ -56,11 +53,6 @@ class ChainView(Situations):
     """``(2,)`` or ``(m, 2)`` goal of the tip [m]."""
     previous_distance: float | FloatArray
     """Distance of the tip from the goal before the last decision [m], ``(m,)`` if it differs."""
-
-    @property
-    def n_situations(self) -> int:
-        """Number of situations."""
-        return self.places.shape[1]
 
     @property
     def tip(self) -> FloatArray:
@@ -158,34 +150,24 @@ SPEEDS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 SPEED = Variable("speed", "1", -1.0, 1.0, centers=SPEEDS, mirrored="opposite")
 
 
-class ChainStates:
-    """The states of joints: the joint's own speed and the named variables, in this order.
+def joint_states(
+    view: ChainView, variables: Sequence[StateVariable], first: int, count: int
+) -> FloatArray:
+    """Return the states ``(count, m, d)`` of `count` joints from `first` on.
 
-    Parameters
-    ----------
-    names
-        Names of the variables, see `CHAIN_VARIABLES`. Values of users' functions are checked.
-
-    Raises
-    ------
-    ValueError
-        If a variable is unknown or repeated, or there is none.
+    They are the joint's own speed and the variables, in this order. Values of users' functions are
+    checked.
     """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._variables = [find_variable(CHAIN_VARIABLES, name) for name in names]
-        self.space = space_of("+".join(names), SPEED, self._variables)
-
-    def of_joints(self, view: ChainView, first: int, count: int) -> FloatArray:
-        """Return the states ``(count, m, d)`` of `count` joints from `first` on."""
-        joints = slice(first, first + count)
-        states = np.empty((count, view.n_situations, 1 + len(self._variables)))
-        states[:, :, 0] = view.speeds[joints]
-        for column, variable in enumerate(self._variables, 1):
-            if variable.trusted:
-                states[:, :, column] = variable.function(view, joints)
-            else:
-                read_only = guard(view)
-                for joint in range(count):
-                    states[joint, :, column] = variable(read_only, first + joint)
-        return states
+    joints = slice(first, first + count)
+    m = view.places.shape[1]
+    states = np.empty((count, m, 1 + len(variables)))
+    states[:, :, 0] = view.speeds[joints]
+    for column, variable in enumerate(variables, 1):
+        if variable.trusted:
+            states[:, :, column] = variable.function(view, joints)
+        else:
+            read_only = guard(view)
+            for joint in range(count):
+                values = variable.function(read_only, first + joint)
+                states[joint, :, column] = variable.checked(values, m)
+    return states

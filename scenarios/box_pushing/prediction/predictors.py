@@ -14,7 +14,7 @@ exact
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -55,50 +55,21 @@ def push_model(
     return model._replace(friction_force=IMMOBILE) if predictor == "static" else model
 
 
-@dataclass(frozen=True)
-class Future:
-    """Simulation that continues from a saved state."""
-
-    world: World
-    """World with the same robots and box, for playing; modified."""
-    state: WorldState
-    """State to start from."""
-    failures: Failures
-    """Failures of the scenario; not modified."""
-    step: int
-    """Number of the step to come."""
-    hold: int
-    """Control periods in one step."""
-
-    def after(self, commands: FloatArray, periods: int) -> tuple[FloatArray, FloatArray]:
-        """Return poses ``(M + 1, 3)``, the box first, and gaps ``(M,)`` under held commands."""
-        self._play(commands, periods)
-        return np.vstack([self.world.box_pose, self.world.robot_poses]), self.world.gaps.copy()
-
-    def onward(self, commands: FloatArray) -> Future:
-        """Return where the world goes from the end of a step under held commands."""
-        failures = self._play(commands, self.hold)
-        return replace(self, state=self.world.state(), failures=failures, step=self.step + 1)
-
-    def _play(self, commands: FloatArray, periods: int) -> Failures:
-        """Play control periods from the saved state; return the failures at their end."""
-        self.world.restore(self.state)
-        failures = deepcopy(self.failures)
-        self.world.set_grip(failures.grip)
-        for number, past in enumerate(range(0, periods, self.hold), self.step):
-            self.world.advance_failing(failures, commands, number, min(self.hold, periods - past))
-        return failures
-
-
 class ExactPrediction(BoxPrediction):
-    """Prediction by simulation.
+    """Prediction by simulation, which continues from a saved state.
 
     Parameters
     ----------
     situation, model, settings
         See `BoxPrediction`.
-    future
-        The simulation.
+    world
+        World with the same robots and box, for playing; modified.
+    state
+        State to start from.
+    failures
+        Failures of the scenario; not modified.
+    step
+        Number of the step to come.
     """
 
     def __init__(
@@ -106,34 +77,52 @@ class ExactPrediction(BoxPrediction):
         situation: PresentState,
         model: PushModel,
         settings: PredictionSettings,
-        future: Future,
+        world: World,
+        state: WorldState,
+        failures: Failures,
+        step: int,
     ) -> None:
         super().__init__(situation, model, settings)
-        self.future = future
+        self._future = world, state, failures, step
 
     def assuming(self, assumptions: Assumptions) -> BoxPrediction:
         """Return the prediction under other assumptions, by simulation unless poses are learned."""
         other = super().assuming(assumptions)
         if assumptions.regressions is not None:
             return other
-        return ExactPrediction(other.situation, other.model, other.settings, self.future)
+        return ExactPrediction(other.situation, other.model, other.settings, *self._future)
 
     def best_responses(self, rules: RuleBase) -> None:
         """Return None, because every joint action must be simulated."""
 
+    def _play(self, commands: FloatArray, seconds: float) -> tuple[World, Failures]:
+        """Play under held commands from the saved state; return the world and its failures."""
+        world, state, failures, step = self._future
+        world.restore(state)
+        failures = deepcopy(failures)
+        world.set_grip(failures.grip)
+        periods, hold = (round(s / CONTROL_PERIOD) for s in (seconds, self.settings.period))
+        for number, past in enumerate(range(0, periods, hold), step):
+            world.advance_failing(failures, commands, number, min(hold, periods - past))
+        return world, failures
+
     def _after(self, actions: IntArray, seconds: float) -> SituationBatch:
         distinct, rows = np.unique(actions, axis=1, return_inverse=True)
-        commands = speeds_of(distinct, self.wheel_commands.speeds)
-        played = [self.future.after(each, round(seconds / CONTROL_PERIOD)) for each in commands.T]
-        poses = np.stack([poses for poses, _ in played], axis=-1)[..., rows]
-        gaps = np.stack([gaps for _, gaps in played], axis=-1)[..., rows]
-        return self._batch(poses[1:].copy(), poses[0].copy(), gaps.copy(), seconds)
+        poses, gaps = [], []
+        for commands in speeds_of(distinct, self.wheel_commands.speeds).T:
+            world, _ = self._play(commands, seconds)
+            poses.append(world.poses)
+            gaps.append(world.gaps)
+        every = np.stack(poses, axis=-1)[..., rows]
+        apart = np.stack(gaps, axis=-1)[..., rows]
+        return self._batch(every[1:].copy(), every[0].copy(), apart.copy(), seconds)
 
     def after(self, joint_action: IntArray) -> ExactPrediction:
         """Return the prediction from the situation after a joint action ``(n,)``."""
         speeds = self.commands(joint_action)
-        future = self.future.onward(speeds)
-        box = future.state.poses[0]
-        robots = future.state.poses[1:]
+        world, failures = self._play(speeds, self.settings.period)
+        state = world.state()
+        box, robots = state.poses[0], state.poses[1:]
         reached = replace(self.situation, robots=robots, box=box, speeds=speeds)
-        return ExactPrediction(reached, self.model, self.settings, future)
+        future = world, state, failures, self._future[3] + 1
+        return ExactPrediction(reached, self.model, self.settings, *future)

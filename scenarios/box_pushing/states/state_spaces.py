@@ -57,72 +57,42 @@ class BoxStateSpace:
         return out
 
 
-_E_PUCK_SPEED = 0.13
+E_PUCK_SPEED = 0.13
+"""Maximum wheel speed of the e-Puck [m/s]."""
 _SPEED = Variable(
     "wheel_speed",
     "m/s",
-    -_E_PUCK_SPEED,
-    _E_PUCK_SPEED,
+    -E_PUCK_SPEED,
+    E_PUCK_SPEED,
     centers=(-0.13, -0.065, 0.0, 0.065, 0.13),
     labels=("fast back", "back", "still", "forward", "fast forward"),
     mirrored="same",
 )
-
-
-def build_space(name: str, *shared: str) -> BoxStateSpace:
-    """Return a state space of the own wheel speed and of shared variables by name.
-
-    Raises
-    ------
-    ValueError
-        If there is none, one is unknown or named twice.
-    """
-    return _space_over(name, [find_variable(STATE_VARIABLES, one) for one in shared])
-
-
-def _space_over(name: str, shared: Sequence[StateVariable]) -> BoxStateSpace:
-    return BoxStateSpace(space_of(name, _SPEED, shared), tuple(shared))
-
-
-def _space_of_paper() -> BoxStateSpace:
-    """Return the state of Eq. 1, with even membership functions of the distance of the box."""
-    names = ("heading", "goal_bearing", "goal_distance", "box_orientation", "box_goal_bearing")
-    shared = [find_variable(STATE_VARIABLES, one) for one in names]
-    distance = find_variable(STATE_VARIABLES, "box_distance")
-    even = Variable("box_distance", "m", 0.0, 1.2, mirrored="same")
-    return _space_over("paper", [*shared, replace(distance, variable=even)])
-
-
+_EVEN_DISTANCE = Variable("box_distance", "m", 0.0, 1.2, mirrored="same")
+"""Distance of the box in the state of Eq. 1, with even membership functions."""
 _PROGRESS = ("box_distance", "approach")
 _PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", *_PROGRESS)
 _TEAM = ("gap", "face_bearing", "side", "others_away")
+_BOX = ("box_orientation", "box_goal_bearing", "box_distance")
 
-STATE_SPACES: dict[str, BoxStateSpace] = {
-    "paper": _space_of_paper(),
-    # The same with the box as the goal of an agent.
-    "paper-box": build_space(
-        "paper-box",
-        "heading",
-        "box_bearing",
-        "robot_box_distance",
-        "box_orientation",
-        "box_goal_bearing",
-        "box_distance",
-    ),
+STATE_SPACES: dict[str, tuple[str, ...]] = {
+    # Eq. 1, and the same with the box as the goal of an agent.
+    "paper": ("heading", "goal_bearing", "goal_distance", *_BOX),
+    "paper-box": ("heading", "box_bearing", "robot_box_distance", *_BOX),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
-    "relational": build_space("relational", *_PUSHING),
-    "pose": build_space("pose", *_PUSHING, "bend", "box_turn"),
+    "relational": _PUSHING,
+    "pose": (*_PUSHING, "bend", "box_turn"),
     # The same for boxes that are wide for a robot, and for any number of robots.
-    "crowd": build_space(
-        "crowd", *_TEAM, "contact_push_bearing", "contact_cross_track_error", *_PROGRESS
-    ),
+    "crowd": (*_TEAM, "contact_push_bearing", "contact_cross_track_error", *_PROGRESS),
     # For boxes so wide that they hardly turn on the way: the path of the box, not the push.
-    "wide": build_space("wide", *_TEAM, "path_bearing", "path_cross_track_error", *_PROGRESS),
+    "wide": (*_TEAM, "path_bearing", "path_cross_track_error", *_PROGRESS),
 }
-"""State spaces by the name that specs use."""
+"""Shared variables of state spaces by the name that specs use."""
 
 
-def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxStateSpace:
+def state_space_for(
+    chosen: str | tuple[str, ...], max_speed: float = E_PUCK_SPEED
+) -> BoxStateSpace:
     """Return a state space, with the range of wheel speeds adapted to a robot.
 
     Parameters
@@ -132,18 +102,22 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     max_speed
         Maximum wheel speed of the robot [m/s].
 
+    Raises
+    ------
+    ValueError
+        If there is no variable, or one is unknown or named twice.
+
     Examples
     --------
     >>> state_space_for("paper", 0.26).space.variables[0].centers
     (-0.26, -0.13, 0.0, 0.13, 0.26)
     """
-    space = (
-        STATE_SPACES[chosen] if isinstance(chosen, str) else build_space("+".join(chosen), *chosen)
-    )
-    factor = max_speed / _E_PUCK_SPEED
-    if factor == 1.0:
-        return space
+    names = STATE_SPACES[chosen] if isinstance(chosen, str) else chosen
+    shared = [find_variable(STATE_VARIABLES, name) for name in names]
+    if chosen == "paper":
+        shared[-1] = replace(shared[-1], variable=_EVEN_DISTANCE)
+    factor = max_speed / E_PUCK_SPEED
     centers = tuple(factor * center for center in _SPEED.centers)
     speed = replace(_SPEED, low=factor * _SPEED.low, high=factor * _SPEED.high, centers=centers)
-    variables = tuple(speed if v.name == speed.name else v for v in space.space.variables)
-    return replace(space, space=replace(space.space, variables=variables))
+    name = chosen if isinstance(chosen, str) else "+".join(chosen)
+    return BoxStateSpace(space_of(name, speed, shared), tuple(shared))

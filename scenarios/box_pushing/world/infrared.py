@@ -13,16 +13,9 @@ from ....core.numerics import FloatArray, njit
 from ...angles import rotate
 from .geometry import BoxShape, ray
 
-
-class Response(NamedTuple):
-    """Readings by distance, see `InfraredSettings`."""
-
-    reach: float
-    """Distance beyond which they are 0 [m]."""
-    decay: float
-    """Distance over which an exponential reading falls to 1/e [m]."""
-    kind: int
-    """0 for exponential, 1 for linear, 2 for binary readings."""
+Response = tuple[float, float, int]
+"""Readings by distance, see `InfraredSettings`: distance beyond which they are 0 [m], distance over
+which an exponential reading falls to 1/e [m], and 0 for exponential, 1 for linear, 2 for binary."""
 
 
 class InfraredSensors(NamedTuple):
@@ -38,11 +31,12 @@ class InfraredSensors(NamedTuple):
 
 @njit(cache=True)
 def _reading(distance: float, response: Response) -> float:
-    if distance >= response.reach:
+    reach, decay, kind = response
+    if distance >= reach:
         return 0.0
-    if response.kind == 0:
-        return exp(-max(distance, 0.0) / response.decay)
-    return 1.0 - max(distance, 0.0) / response.reach if response.kind == 1 else 1.0
+    if kind == 0:
+        return exp(-max(distance, 0.0) / decay)
+    return 1.0 - max(distance, 0.0) / reach if kind == 1 else 1.0
 
 
 @njit(cache=True)
@@ -81,12 +75,12 @@ def infrared_readings(
     out = np.zeros(directions.shape)
     cos, sin = np.cos(box[2]), np.sin(box[2])
     for r in range(len(robots)):
-        if gaps[r] >= response.reach:
+        if gaps[r] >= response[0]:
             continue
         x, y = rotate(cos, -sin, robots[r, 0] - box[0], robots[r, 1] - box[1])
         for k in range(directions.shape[1]):
             angle = robots[r, 2] + directions[r, k] - box[2]
             dx, dy = np.cos(angle), np.sin(angle)
             start_x, start_y = x + radii[r] * dx, y + radii[r] * dy
-            out[r, k] = _reading(ray(shape, start_x, start_y, dx, dy, response.reach), response)
+            out[r, k] = _reading(ray(shape, start_x, start_y, dx, dy, response[0]), response)
     return out

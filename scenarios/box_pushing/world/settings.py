@@ -110,16 +110,14 @@ Vertices = Annotated[
 ]
 
 
-class Described(Settings):
-    """User-defined object, described by a table that may give it a name."""
-
-    name: Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = None
-    """Name in labels; nothing else depends on it."""
+Label = Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
-class BoxSettings(Described):
+class BoxSettings(Settings):
     """User-defined box: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
 
+    name: Label | None = None
+    """Name in labels; nothing else depends on it."""
     vertices: Vertices
     """Outline, counter-clockwise [m]: a list of points, or the path of a CSV file with columns x
     and y, relative to the spec. Concave outlines are allowed."""
@@ -150,9 +148,11 @@ class WheelSettings(Settings):
     """Position of the wheel to the left of the center [m]."""
 
 
-class RobotSettings(Described):
+class RobotSettings(Settings):
     """A robot; what is not given is the e-Puck's."""
 
+    name: Label | None = None
+    """Name in labels; nothing else depends on it."""
     wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1, max_length=6)]
     """Wheels, one agent each; at most six, because predictions enumerate their joint actions."""
     radius: Annotated[float, Field(ge=0.001, le=10)] = 0.037
@@ -222,7 +222,7 @@ class InfraredSettings(Settings):
     @property
     def response(self) -> Response:
         """Constants of the response, for kernels."""
-        return Response(self.reach, self.decay, get_args(Normalization).index(self.normalization))
+        return self.reach, self.decay, get_args(Normalization).index(self.normalization)
 
     def reading(self, distance: FloatArray) -> FloatArray:
         """Return the readings at distances [m] straight ahead; negative distances touch."""

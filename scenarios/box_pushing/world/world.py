@@ -36,7 +36,6 @@ from .stepping import (
     VELOCITY_ITERATIONS,
     Physics,
     advance,
-    advance_many,
     step_address,
 )
 
@@ -90,6 +89,8 @@ class World:
         ``(M,)`` whether each robot touches the box.
     addresses
         ``(M + 2,)`` memory addresses of the world, the box and the robots; valid until `restore`.
+    physics, sensors
+        Constants of the simulation and of the infrared sensors, for kernels.
     contact_time
         ``(M,)`` fraction of the control periods of the last `advance` that ended in contact.
 
@@ -117,9 +118,7 @@ class World:
         self.n_wheels = sum(len(robot.wheels) for robot in robots)
         self.dt = CONTROL_PERIOD / SUBSTEPS
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
-        self._sensors = InfraredSensors(
-            self._radii, sensor_directions(robots), self.sensor.response
-        )
+        self.sensors = InfraredSensors(self._radii, sensor_directions(robots), self.sensor.response)
         self.set_grip(np.ones(self.n_wheels))
         around = 2.0 * box.reach * np.arange(1, len(robots) + 1)
         self.place(np.stack([-around, 0 * around, 0 * around], axis=1), np.zeros(3))
@@ -132,7 +131,7 @@ class World:
         self._grip: FloatArray = np.array(grip, dtype=float)
         if self._grip.shape != (self.n_wheels,) or not (self._grip >= 0).all():
             raise ValueError(f"grip: {grip}, must be {self.n_wheels} numbers >= 0")
-        self._physics = Physics(
+        self.physics = Physics(
             step_address() or 0,
             SUBSTEPS,
             self.dt,
@@ -210,11 +209,11 @@ class World:
         They are held, ``(n_wheels,)``, or those of each period, ``(periods, n_wheels)``.
         """
         speeds = np.full((periods, self.n_wheels), wheel_speeds) * UNIT
-        if not self._physics.step:
+        if not self.physics.step:
             self._advance_by_steps(speeds)
             return
         poses, self.gaps, self.contact_time = advance(
-            self._physics, self.addresses, speeds, self._last, self._wrenches
+            self.physics, self.addresses, speeds, self._last, self._wrenches
         )
         self._know(poses)
 
@@ -236,34 +235,6 @@ class World:
             touched += self.contact
         self.contact_time = touched / len(speeds)
 
-    def advance_many(
-        self, addresses: IntArray, wheel_speeds: FloatArray, periods: int,
-        last: FloatArray, wrenches: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:  # fmt: skip
-        """Simulate control periods in many equal worlds without failures, as `advance` does.
-
-        Parameters
-        ----------
-        addresses
-            ``(W, M + 2)`` of all worlds.
-        wheel_speeds
-            ``(W, n_wheels)`` [m/s], held.
-        periods
-            How many.
-        last, wrenches
-            ``(W, M, 3)`` as in `WorldState`; modified.
-
-        Returns
-        -------
-        poses, gaps, readings : FloatArray
-            ``(W, M + 1, 3)`` of boxes and robots [m, m, rad], ``(W, M)`` [m], and what the infrared
-            sensor of a robot reads most of the box ``(W, M)``.
-        """
-        speeds = wheel_speeds * UNIT
-        return advance_many(
-            self._physics, self._sensors, addresses, speeds, periods, last, wrenches
-        )
-
     @property
     def twists(self) -> FloatArray:
         """Velocities (vx, vy, omega) of the box and the robots ``(M + 1, 3)``, world frame."""
@@ -274,7 +245,7 @@ class World:
     def infrared(self) -> FloatArray:
         """Return the noise-free readings of the box by all infrared sensors ``(M, S)``."""
         return infrared_readings(
-            self.robot_poses, self.box_pose, self.gaps, self.box.shape, self._sensors
+            self.robot_poses, self.box_pose, self.gaps, self.box.shape, self.sensors
         )
 
     def _step(self, speeds: FloatArray) -> None:
@@ -282,7 +253,7 @@ class World:
         motion = np.array(
             [(body.angle, *body.linearVelocity, body.angularVelocity) for body in self._bodies]
         )
-        wheel_wrenches(motion, speeds, self.dt, self._physics.wheels, self._last, self._wrenches)
+        wheel_wrenches(motion, speeds, self.dt, self.physics.wheels, self._last, self._wrenches)
         for body, (fx, fy, torque) in zip(self._bodies, self._wrenches.tolist(), strict=True):
             body.ApplyForceToCenter((fx, fy), True)
             body.ApplyTorque(torque, True)

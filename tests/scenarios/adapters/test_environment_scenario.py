@@ -341,7 +341,7 @@ def test_what_cannot_be_adapted_is_refused_in_one_line(make: Any, message: str) 
     [
         (Blind, "observation of agent_1 at step 4: o1 = nan, allowed: finite numbers"),
         (BlindUnsaid, "observation of agent_1 at step 4: o1 = nan, allowed: finite numbers"),
-        (KeyedApart, "keys of agent_0 are place, time, of agent_1 hour, place, allowed: the same"),
+        (KeyedApart, "scenario.variables is missing: players observe different numbers"),
         (Lacking, "observation of agent_0 at step 2: key 'time' is missing"),
         (Leaving, "cannot be played, SystemExit: 0"),
         (Ordering, r"cannot be played, RuntimeError: \\x1b\[2J"),

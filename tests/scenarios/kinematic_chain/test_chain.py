@@ -11,7 +11,12 @@ import nested_agents as na
 from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
-from nested_agents.scenarios.kinematic_chain.variables import BUILT_IN, CHAIN_VARIABLES, ChainView
+from nested_agents.scenarios.kinematic_chain.variables import (
+    BUILT_IN,
+    CHAIN_VARIABLES,
+    ChainView,
+    joint_states,
+)
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
@@ -75,7 +80,7 @@ def test_actions_that_come_to_the_same_are_known_to_best_responses() -> None:
 def test_variables_of_all_joints_at_once_equal_those_of_each() -> None:
     scenario = moving(6, state_space=BUILT_IN)
     view = scenario.predict().view_after(np.random.default_rng(3).integers(4, size=(30, 6)))
-    states = scenario._states.of_joints(view, 0, 6)[:, :, 1:]
+    states = joint_states(view, scenario._variables, 0, 6)[:, :, 1:]
     for column, name in enumerate(BUILT_IN):
         variable = CHAIN_VARIABLES.find(name)
         for joint in range(6):

@@ -12,7 +12,6 @@ from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.states.situations import SituationBatch
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
     STATE_SPACES,
-    build_space,
     state_space_for,
 )
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
@@ -33,12 +32,12 @@ def shared(batch: SituationBatch, robot: int) -> dict[str, float]:
 
 
 VARIABLES = tuple(STATE_VARIABLES.built_in)
-EVERY = build_space("every", *VARIABLES)
+EVERY = state_space_for(VARIABLES)
 
 
 @pytest.mark.parametrize("name", STATE_SPACES)
 def test_functions_fill_the_space_they_describe(name: str) -> None:
-    spec = STATE_SPACES[name]
+    spec = state_space_for(name)
     poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
     batch = batch_of(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE)
     assert spec.space.n_own == 1
@@ -112,9 +111,9 @@ def test_equation_1_by_hand() -> None:
     # The robot looks west; the goal (1, 0) is 2 m north of it, the box 3 m west.
     batch = situation([[1.0, -2.0, pi]], [-2.0, -2.0, 0.3], [0.1])
     of_box = [0.3, np.arctan2(2.0, 3.0) - 0.3, np.hypot(2.0, 3.0)]
-    found = STATE_SPACES["paper"].shared(batch, [0])[0][0]
+    found = state_space_for("paper").shared(batch, [0])[0][0]
     np.testing.assert_allclose(found, [-pi, -pi / 2, 2.0, *of_box], atol=1e-12)
-    found = STATE_SPACES["paper-box"].shared(batch, [0])[0][0]
+    found = state_space_for("paper-box").shared(batch, [0])[0][0]
     np.testing.assert_allclose(found, [-pi, 0.0, 3.0, *of_box], atol=1e-12)
 
 
@@ -132,8 +131,7 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
 
 @pytest.mark.parametrize("name", STATE_SPACES)
 def test_memberships_of_wheel_speeds_span_those_of_the_robot(name: str) -> None:
-    assert state_space_for(name, 0.13) is STATE_SPACES[name]
-    fast, plain = state_space_for(name, 0.39).space, STATE_SPACES[name].space
+    fast, plain = state_space_for(name, 0.39).space, state_space_for(name).space
     for variable, like in zip(fast.variables, plain.variables, strict=True):
         if variable.name != "wheel_speed":
             assert variable == like
@@ -240,7 +238,7 @@ def gap(situation, robot):
     return situation.box
 """
     with Sources(texts={"mine.py": text}).active():
-        space = build_space("own", "mine.py:gap")
+        space = state_space_for(("mine.py:gap",))
     with pytest.raises(ValueError, match="state variable 'gap': shape"):
         space.shared(situation([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])
 
@@ -268,7 +266,7 @@ def wrong(situation, robot):
     return {returned}
 """
     with Sources(texts={"wrong.py": text}).active():
-        space = build_space("own", "gap", "wrong.py:wrong")
+        space = state_space_for(("gap", "wrong.py:wrong"))
     poses = np.random.default_rng(0).normal(size=(5, 2, 3))
     gaps = np.abs(poses[:, :, 0])
     batch = batch_of(poses, poses[:, 0].copy(), gaps, GOAL, ORIGIN, 1.0, SQUARE)

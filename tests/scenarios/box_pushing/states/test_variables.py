@@ -12,7 +12,7 @@ from nested_agents.scenarios.box_pushing.states.situations import (
     angle_of,
     whole_batch,
 )
-from nested_agents.scenarios.box_pushing.states.state_spaces import build_space
+from nested_agents.scenarios.box_pushing.states.state_spaces import state_space_for
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
@@ -46,12 +46,12 @@ def test_compiled_variables_are_those_of_the_reference(
 ) -> None:
     batch, wanted = drawn(box, robots, scale=scale), list(range(robots))[::-1]
     expected = [[variables(batch, robot)[name] for name in names] for robot in wanted]
-    found = build_space("some", *names).shared(batch, wanted)
+    found = state_space_for(tuple(names)).shared(batch, wanted)
     np.testing.assert_allclose(found, np.swapaxes(expected, 1, 2), rtol=0, atol=1e-12)
 
 
 def test_a_situation_has_the_same_bits_alone_and_among_others() -> None:
-    space, batch = build_space("all", *NAMES), drawn("L", 10, scale=0.1)
+    space, batch = state_space_for(tuple(NAMES)), drawn("L", 10, scale=0.1)
     many = space.shared(batch, range(10))
     for s in (0, 7, 99):
         alone = [each[..., s : s + 1].copy() for each in (*batch[:3], batch.origins)]
