@@ -12,6 +12,7 @@ import nested_agents as na
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.environments import joint
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.environments import observed_places
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 from research import push_n
 
@@ -109,7 +110,8 @@ def test_worlds_are_those_of_evaluations_in_studies() -> None:
     assert steps == (2,) * 10
     scenario = BoxPushingSettings(robots=2).build()
     states = scenario.reset(world_seed(3, EVALUATION_WORLDS + 9), 0)
-    np.testing.assert_array_equal(worlds[18], env.players["single"].observe(states))
+    places = observed_places(scenario, range(4), by_agent=False)
+    np.testing.assert_array_equal(worlds[18], states.astype(np.float32).ravel()[places])
 
 
 @pytest.mark.slow
