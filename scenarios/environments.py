@@ -17,7 +17,7 @@ from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from numpy.typing import ArrayLike, NDArray
 from pettingzoo import ParallelEnv
 
-from ..core.interface.abilities import measurements_of, options_of
+from ..core.interface.abilities import Recorded, measurements_of, options_of
 from ..core.interface.recording import EpisodeRecorder
 from ..core.interface.scenario import Scenario
 from ..core.numerics import FloatArray, IntArray
@@ -32,7 +32,7 @@ Players = Literal["agents", "bodies", "team"]
 
 
 @runtime_checkable
-class Rendered(Protocol):
+class Rendered(Recorded, Protocol):
     """Optional part of a scenario: pictures of recordings."""
 
     def picture(self, recording: Mapping[str, Any]) -> NDArray[np.uint8]:
@@ -167,7 +167,7 @@ class AgentsEnv(ParallelEnv):
         if world is None:
             world = int(self._seeds.integers(2**63))
         states = self.scenario.reset(world, self._episode)
-        if self.render_mode is not None:
+        if self.render_mode is not None and isinstance(self.scenario, Rendered):
             self._recorder = EpisodeRecorder(self.scenario)
         return self._observe(states, measurements_of(self.scenario))
 
@@ -277,8 +277,9 @@ class JointEnv(gymnasium.Env):
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         self._env.agents = ["single"]  # Gymnasium lets an episode be continued after its end
         actions = {"single": np.asarray(action, dtype=np.int64)}
-        observations, rewards, ends, breaks, infos = (t["single"] for t in self._env.step(actions))
-        return observations, rewards, ends, breaks, infos
+        observations, rewards, *flags, infos = self._env.step(actions)
+        terminated, truncated = (flag["single"] for flag in flags)
+        return observations["single"], rewards["single"], terminated, truncated, infos["single"]
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture, see `AgentsEnv.render`."""

@@ -6,7 +6,7 @@ import json
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from ..core.numerics import nx
@@ -45,8 +45,12 @@ def read_file(path: str) -> nx.Graph | dict[str, object]:
         raise ValueError(f"{path}: suffix must be .graphml, .json or .toml")
     text = sources.active().text(path)
     try:
-        parse = {".graphml": node_link_table, ".toml": tomllib.loads, ".json": _json}[suffix]
-        content = parse(text)
+        parsers: dict[str, Callable[[str], object]] = {
+            ".graphml": node_link_table,
+            ".toml": tomllib.loads,
+            ".json": _json,
+        }
+        content = parsers[suffix](text)
         if isinstance(content, dict) and "nodes" in content:
             return _node_link_graph(content)
         return _table_of(content)

@@ -57,7 +57,7 @@ def _pickled_copies(simulator: Simulator) -> Copies:
 
     @contextmanager
     def copies() -> Iterator[Simulator]:
-        copied = {id(layer): object.__new__(type(layer)) for layer in layers}
+        copied: dict[int, Any] = {id(layer): object.__new__(type(layer)) for layer in layers}
         unpickler: Any = pickle.Unpickler(BytesIO(saved))
         unpickler.persistent_load = (shared | copied).__getitem__
         for layer, attributes in zip(copied.values(), unpickler.load(), strict=True):

@@ -78,8 +78,8 @@ class StateReader:
             raise ValueError("observation: all of its numbers are constant in random episodes")
         self.common: tuple[str, ...] = ()
         if len(spaces) == 1:
-            rows = {name: self._places[name] for name in names}
-            self.common = tuple(name for name, at in rows.items() if (at == at[:, :1]).all())
+            places = [(name, self._places[name]) for name in names]
+            self.common = tuple(name for name, at in places if (at == at[:, :1]).all())
 
     def _common_names(self) -> list[str]:
         """Return the names of the numbers that all players observe, in the order of the first."""

@@ -42,7 +42,9 @@ def faults_of_prediction(
     rewards = prediction.rewards(given)
     if not np.array_equal(joint_actions, given):
         yield "the joint actions that are to be predicted are changed"
-    wanted = {f"states of agent {i}": (each[i], (m, space.n_variables)) for i in range(n)}
+    wanted: dict[str, tuple[FloatArray, tuple[int, ...]]] = {
+        f"states of agent {i}": (each[i], (m, space.n_variables)) for i in range(n)
+    }
     wanted["own variables of all agents"] = own, (n, m, space.n_own)
     n_shared = space.n_variables - space.n_own
     wanted["shared variables of all groups"] = shared, (len(groups), m, n_shared)

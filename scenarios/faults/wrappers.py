@@ -247,9 +247,9 @@ class _Faulty:
         driven = self._failures.driven(places, 1)[0]
         changed = self._failures.failed
         for fault, mask in self._failures.active():
-            if fault.kind == "free":
+            if fault.effect == "free":
                 driven[mask] = 0.0
-            elif fault.kind == "seized" and self._commands == "position":
+            elif fault.effect == "seized" and self._commands == "position":
                 driven[mask] = self._held[mask]
         self._held = np.where(changed, driven, places)
         beyond = INEXPRESSIBLE[self._commands]
@@ -266,7 +266,7 @@ class _Faulty:
     def _now(self) -> dict[str, str]:
         """Return the kind of fault of every failed actuator; the last one of several."""
         return {
-            self.actuators[i]: fault.kind
+            self.actuators[i]: fault.effect
             for fault, mask in self._failures.active()
             for i in np.flatnonzero(mask)
         }

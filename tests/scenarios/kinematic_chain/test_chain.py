@@ -84,7 +84,7 @@ def test_variables_of_all_joints_at_once_equal_those_of_each() -> None:
     for column, name in enumerate(BUILT_IN):
         variable = CHAIN_VARIABLES.find(name)
         for joint in range(6):
-            assert states[joint, :, column] == pytest.approx(variable(view, joint))
+            assert states[joint, :, column] == pytest.approx(variable.function(view, joint))
 
 
 @na.state_variable("m", -1.0, 1.0)
