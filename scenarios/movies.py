@@ -107,17 +107,12 @@ def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -
     frames = [draw(int(step)) for step in steps]
     partial = path.with_name(f".{path.stem}.partial{path.suffix}")
     if path.suffix == ".gif":
-        _write_gif(partial, frames, seconds)
+        # A common palette avoids flicker and is computed once.
+        palette = Image.fromarray(frames[-1]).quantize(128)
+        dither = Image.Dither.NONE
+        images = [Image.fromarray(f).quantize(palette=palette, dither=dither) for f in frames]
+        durations = [round(1000 * seconds)] * (len(images) - 1) + [1500]
+        images[0].save(partial, save_all=True, append_images=images[1:], duration=durations, loop=0)
     else:
         imageio.mimwrite(partial, [*frames], fps=1 / seconds, macro_block_size=16)
     partial.replace(path)
-
-
-def _write_gif(path: Path, frames: list[Pixels], seconds: float) -> None:
-    # A common palette avoids flicker and is computed once.
-    palette = Image.fromarray(frames[-1]).quantize(128)
-    images = [
-        Image.fromarray(f).quantize(palette=palette, dither=Image.Dither.NONE) for f in frames
-    ]
-    durations = [round(1000 * seconds)] * (len(images) - 1) + [1500]
-    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0)

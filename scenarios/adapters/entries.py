@@ -51,13 +51,12 @@ class ObservationEntries:
         self.player = player
         self.space = space
         self._name = describe("observation", player)
-        parts = dict(space.spaces) if isinstance(space, Dict) else {"o": space}
-        for key, part in parts.items():
+        self._parts = dict(space.spaces) if isinstance(space, Dict) else {"o": space}
+        self.names: list[str] = []
+        for key, part in self._parts.items():
             if key in MASK_KEYS:
                 raise mask_error(player, f"observation has {key}")
             _check_part(part, self._name)
-        self.names: list[str] = []
-        for key, part in parts.items():
             count = 1 if part is space and isinstance(part, Discrete) else flatdim(part)
             is_single = count == 1 and part is not space
             self.names += [str(key)] if is_single else [f"{key}{i}" for i in range(count)]
@@ -83,18 +82,16 @@ class ObservationEntries:
             If the observation does not fit its space.
         """
         name = f"{self._name} {when(step)}"
-        if isinstance(self.space, Dict):
-            if not isinstance(observation, Mapping):
-                observation = {}
-            for key in self.space:
-                if key not in observation:
-                    raise ValueError(f"{name}: key {key!r} is missing")
-            parts = [_flat(p, observation[k], f"{name}: {k}") for k, p in self.space.items()]
-            numbers = np.concatenate(parts)
-        elif isinstance(self.space, Discrete):
-            numbers = np.atleast_1d(_flat(self.space, observation, name).argmax() + self.bounds[0])
-        else:
-            numbers = _flat(self.space, observation, name)
+        is_dict = isinstance(self.space, Dict)
+        values = observation if is_dict else {"o": observation}
+        parts = []
+        for key, part in self._parts.items():
+            if not isinstance(values, Mapping) or key not in values:
+                raise ValueError(f"{name}: key {key!r} is missing")
+            parts.append(_flat(part, values[key], f"{name}: {key}" if is_dict else name))
+        numbers = np.concatenate(parts)
+        if isinstance(self.space, Discrete):
+            numbers = np.atleast_1d(numbers.argmax() + self.bounds[0])
         if len(numbers) != len(self.names):
             raise ValueError(f"{name}: {len(numbers)} numbers, allowed: {self.space}")
         return numbers

@@ -76,17 +76,6 @@ class Wheels(NamedTuple):
     """Radius of the robot [m]."""
 
 
-class Others(NamedTuple):
-    """Other robots, as a walking robot sees them."""
-
-    plans: FloatArray
-    """``(DEPTH, M, 2)`` positions of all robots after each of their planned actions [m]."""
-    near: IntArray
-    """Robots that it may meet."""
-    span: float
-    """Distance that it keeps from their centers [m]."""
-
-
 def sides_of(box: BoxSpec) -> list[HullSide]:
     """Return the sides of the convex hull of a box, counterclockwise.
 
@@ -267,10 +256,10 @@ def _moved(wheels: Wheels, pose: FloatArray, speeds: FloatArray) -> Pose:
 
 
 @njit(cache=True)
-def _crowding(x: float, y: float, others: FloatArray, near: IntArray, span: float) -> float:
-    """Return by how much a robot comes too close to others, in all [m]."""
+def _crowding(x: float, y: float, others: FloatArray, span: float) -> float:
+    """Return by how much a robot comes too close to others ``(k, 2)``, in all [m]."""
     total = 0.0
-    for k in near:
+    for k in range(len(others)):
         dx, dy = x - others[k, 0], y - others[k, 1]
         square = dx * dx + dy * dy
         if square < span * span:
@@ -283,14 +272,16 @@ def _search(
     pose: FloatArray,
     speeds: FloatArray,
     place: Pose,
-    others: Others,
+    plans: FloatArray,
     path: Path,
     wheels: Wheels,
 ) -> tuple[int, FloatArray]:
     """Return the first action of the best sequence, and the poses ``(DEPTH, 3)`` after each action.
 
     The search goes depth first; it leaves a sequence as soon as it costs more than the best one.
+    `plans` are the positions ``(DEPTH, k, 2)`` of the robots nearby after their planned actions.
     """
+    span = 2.0 * wheels.radius + CLEARANCE_M
     n_actions = len(wheels.gains)
     trail = np.empty((DEPTH + 1, 3))
     costs = np.zeros(DEPTH + 1)
@@ -311,8 +302,7 @@ def _search(
         reached = after[level, tried[level]]
         tried[level] += 1
         x, y, heading = _moved(wheels, trail[level], reached)
-        near = _crowding(x, y, others.plans[level], others.near, others.span)
-        cost = costs[level] + 10.0 * near
+        cost = costs[level] + 10.0 * _crowding(x, y, plans[level], span)
         if cost >= best:
             continue
         is_last = level == DEPTH - 1
@@ -355,8 +345,8 @@ def walk(
         The curve around the box, and the commands of a robot.
     """
     n_robots = len(speeds)
-    span = 2.0 * wheels.radius + CLEARANCE_M
-    reach = span + 2.0 * (DEPTH + 1) * wheels.period * wheels.limit
+    way = 2.0 * (DEPTH + 1) * wheels.period * wheels.limit
+    reach = 2.0 * wheels.radius + CLEARANCE_M + way
     plans = np.empty((DEPTH, n_robots, 2))
     for level in range(DEPTH):
         plans[level] = poses[:, :2]
@@ -364,9 +354,9 @@ def walk(
     for r in order:
         apart = np.sqrt((poses[:, 0] - poses[r, 0]) ** 2 + (poses[:, 1] - poses[r, 1]) ** 2)
         apart[r] = np.inf
-        others = Others(plans, np.nonzero(apart < reach)[0], span)
+        near = plans[:, np.nonzero(apart < reach)[0]]
         place = (places[r, 0], places[r, 1], places[r, 2])
-        chosen[r], trail = _search(poses[r], speeds[r], place, others, path, wheels)
+        chosen[r], trail = _search(poses[r], speeds[r], place, near, path, wheels)
         for level in range(DEPTH):
             plans[level, r, 0], plans[level, r, 1] = trail[level, 0], trail[level, 1]
     return chosen

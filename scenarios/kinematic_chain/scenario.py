@@ -113,7 +113,7 @@ class KinematicChain(Scenario):
                 break
         for failures in (self._failures, self._known):
             failures.begin(seed, episode)
-        return self._observe(self._distance())
+        return self.outcome(self._angles, self._speeds, self._goal, self._distance())[0][0]
 
     def step(self, joint_action: IntArray) -> Transition:
         """Turn the joints for one decision period."""
@@ -127,16 +127,38 @@ class KinematicChain(Scenario):
         self._angles = np.clip(angles + PERIOD * held, -self._max_angles, self._max_angles)
         self._step += 1
         moved = working_seconds()
-        states = self._observe(before)
-        info = self.measure()
-        distance = np.array([info["distance_m"]])
-        terminated = bool(distance[0] < self.settings.tolerance)
-        truncated = not terminated and self._step >= self.settings.most_decisions
+        goal, settings = self._goal, self.settings
+        states, rewards, distance = self.outcome(self._angles, self._speeds, goal, before)
+        terminated = bool(distance[0] < settings.tolerance)
+        truncated = not terminated and self._step >= settings.most_decisions
         twists = np.zeros((len(angles), 3))
         twists[:, 2] = (self._angles - angles) / PERIOD
-        reward = float(self._reward(distance, before - distance)[0])
-        info["seconds"] = {"physics": moved - begin, "sensors": working_seconds() - moved}
-        return Transition(states, reward, terminated, truncated, info, twists)
+        seconds = {"physics": moved - begin, "sensors": working_seconds() - moved}
+        info = {**self.measure(), "seconds": seconds}
+        return Transition(states[0], float(rewards[0]), terminated, truncated, info, twists)
+
+    def outcome(
+        self,
+        angles: FloatArray,
+        speeds: FloatArray,
+        goals: FloatArray,
+        before: float | FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return states ``(c, n, d)``, rewards and distances ``(c,)`` of c arms.
+
+        Parameters
+        ----------
+        angles, speeds
+            ``(c, n)`` postures [rad] and commanded speeds [rad/s], ``(n,)`` of one arm.
+        goals, before
+            Goals ``(c, 2)`` and distances before the decision [m].
+        """
+        angles, speeds = np.atleast_2d(angles).T, np.atleast_2d(speeds).T
+        places = forward_kinematics(angles, self.length)
+        view = ChainView(places, angles, speeds / self.settings.top_speed, goals, before)
+        states = joint_states(view, self._variables, 0, len(angles)).transpose(1, 0, 2)
+        rewards = self._reward(view.distance, view.approach)
+        return np.ascontiguousarray(states), rewards, view.distance.copy()
 
     def environments(self, count: int) -> ChainEnvironments | None:
         """Return many arms that are stepped in one call; None if joints fail."""
@@ -211,13 +233,6 @@ class KinematicChain(Scenario):
     def _distance(self) -> float:
         return float(np.hypot(*(self._goal - self._places()[-1])))
 
-    def _observe(self, before: float) -> FloatArray:
-        """Return the states ``(n, d)`` of all agents."""
-        fractions = self._speeds[:, None] / self.settings.top_speed
-        places = self._places()[:, None]
-        view = ChainView(places, self._angles[:, None], fractions, self._goal, before)
-        return joint_states(view, self._variables, 0, len(self.agents))[:, 0]
-
 
 class ChainEnvironments(StackedEnvironments[KinematicChain]):
     """Many arms with the same number of joints and without failures."""
@@ -248,20 +263,13 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
         turned = self._angles + PERIOD * self._speeds
         self._angles = np.clip(turned, -arm._max_angles, arm._max_angles)
         self._steps += 1
-        view = ChainView(
-            places=forward_kinematics(self._angles.T, arm.length),
-            angles=self._angles.T,
-            speeds=self._speeds.T / settings.top_speed,
-            goal=self._goals,
-            previous_distance=self._distance,
+        states, rewards, self._distance = arm.outcome(
+            self._angles, self._speeds, self._goals, self._distance
         )
-        states = joint_states(view, arm._variables, 0, self._angles.shape[1]).transpose(1, 0, 2)
-        rewards = arm._reward(view.distance, view.approach)
-        self._distance = view.distance.copy()
-        terminated = view.distance < settings.tolerance
+        terminated = self._distance < settings.tolerance
         truncated = ~terminated & (self._steps >= settings.most_decisions)
         rewards_by_agent = np.broadcast_to(rewards[:, None], joint_actions.shape)
-        return Transitions(np.ascontiguousarray(states), rewards_by_agent, terminated, truncated)
+        return Transitions(states, rewards_by_agent, terminated, truncated)
 
 
 class ChainPrediction(EmbodiedPrediction, RespondingPrediction):

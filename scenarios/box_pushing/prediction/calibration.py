@@ -106,12 +106,8 @@ def outcomes(
     return moved
 
 
-@njit(cache=True)
 def min_gap(robots: FloatArray, radius: float) -> float:
     """Return the smallest gap [m] between robots ``(M, 3)``; infinite for one robot."""
-    least = np.inf
-    for r in range(len(robots)):
-        for other in range(r):
-            dx, dy = robots[r, 0] - robots[other, 0], robots[r, 1] - robots[other, 1]
-            least = min(least, np.hypot(dx, dy) - 2.0 * radius)
-    return least
+    i, j = np.triu_indices(len(robots), 1)
+    apart = np.hypot(robots[i, 0] - robots[j, 0], robots[i, 1] - robots[j, 1])
+    return float(apart.min(initial=np.inf)) - 2.0 * radius

@@ -99,13 +99,15 @@ def samples_of(
     deflections[:, 2] *= model.radii
     sums = np.array([_sums(contacts)])
     features = np.array([_features(contact, tuple(twists[0])) for contact in contacts])
+    box = _with_mirror(sums, BOX_SIGNS), _with_mirror(twists[:1], TWIST_SIGNS)
     return [
-        (np.vstack([sums, sums * BOX_SIGNS]), np.vstack([twists[:1], twists[:1] * TWIST_SIGNS])),
-        (
-            np.vstack([features, features * ROBOT_SIGNS]),
-            np.vstack([deflections, deflections * TWIST_SIGNS]),
-        ),
+        box,
+        (_with_mirror(features, ROBOT_SIGNS), _with_mirror(deflections, TWIST_SIGNS)),
     ]
+
+
+def _with_mirror(rows: FloatArray, signs: FloatArray) -> FloatArray:
+    return np.vstack([rows, rows * signs])
 
 
 @njit(cache=True)

@@ -94,18 +94,15 @@ def _is_valid(plan: _Plan, robot: int) -> bool:
 @njit(cache=True)
 def _variations(robots: IntArray, plan: _Plan, alike: IntArray) -> IntArray:
     """Return robot actions ``(M, m)`` that differ from the plan in the command of one robot."""
-    changed = np.empty((len(robots) * alike.shape[1], 2), np.int64)
+    actions = np.empty((len(alike), len(robots) * alike.shape[1]), np.int64)
     m = 0
     for r in robots:
         for a in range(alike.shape[1]):
             if alike[r, a] == a != plan.actions[r]:
-                changed[m, 0], changed[m, 1] = r, a
+                actions[:, m] = plan.actions
+                actions[r, m] = a
                 m += 1
-    actions = np.empty((len(alike), m), np.int64)
-    for c in range(m):
-        actions[:, c] = plan.actions
-        actions[changed[c, 0], c] = changed[c, 1]
-    return actions
+    return actions[:, :m].copy()
 
 
 @njit(cache=True)

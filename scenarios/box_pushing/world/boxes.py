@@ -143,18 +143,18 @@ class BoxSpec:
         if self.polygon is None:
             area = pi * self.radius**2
             quarter = pi * self.radius**4 / 4
-            return Moments(area, quarter * np.eye(2), area * self.radius * 2 / 3)
+            return area, quarter * np.eye(2), area * self.radius * 2 / 3
         return moments(polygon_edges(self._centered[0]))
 
     @property
     def area(self) -> float:
         """Area [m2]."""
-        return self.moments.area
+        return self.moments[0]
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about the center of mass [kg m2]."""
-        return float(self.mass * np.trace(self.moments.second) / self.area)
+        return float(self.mass * np.trace(self.moments[1]) / self.area)
 
     @cached_property
     def reach(self) -> float:
@@ -172,7 +172,7 @@ class BoxSpec:
 
         Ground friction resists pure turning with `friction_force` times this lever.
         """
-        return self.moments.radial / self.area
+        return self.moments[2] / self.area
 
     @cached_property
     def shape(self) -> BoxShape:
@@ -187,7 +187,7 @@ class BoxSpec:
         At the corners of a rectangle with the axes and the proportions of the ellipse of inertia,
         scaled such that the greatest friction torque is that of evenly spread friction.
         """
-        spread, axes = np.linalg.eigh(self.moments.second / self.area)
+        spread, axes = np.linalg.eigh(self.moments[1] / self.area)
         half = np.sqrt(spread) * self.friction_radius / sqrt(spread.sum())
         corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half
         return corners @ axes.T

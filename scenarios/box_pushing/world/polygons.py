@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -41,22 +40,16 @@ STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
 
 
-class Moments(NamedTuple):
-    """Moments of an area about the origin."""
-
-    area: float
-    """Area [m2]."""
-    second: FloatArray
-    """``(2, 2)`` integrals of the products of coordinates [m4]."""
-    radial: float
-    """Integral of the distance from the origin [m3]."""
+Moments = tuple[float, FloatArray, float]
+"""Moments of an area about the origin: the area [m2], the integrals ``(2, 2)`` of the products of
+coordinates [m4], and the integral of the distance from the origin [m3]."""
 
 
 def moments(edges: FloatArray) -> Moments:
     """Return the moments of the area within directed edges ``(n, 4)``, material on the left.
 
     They are sums over the signed triangles between the origin and each edge, exact except for
-    `radial`, which is a 64-point Gauss-Legendre quadrature along each edge.
+    the last one, which is a 64-point Gauss-Legendre quadrature along each edge.
     """
     a = edges[:, :2]
     b = edges[:, 2:]
@@ -66,7 +59,7 @@ def moments(edges: FloatArray) -> Moments:
     t = (nodes + 1) / 2
     points = a[:, None] + t[:, None] * (b - a)[:, None]
     mean_distance = np.hypot(points[..., 0], points[..., 1]) @ weights / 2
-    return Moments(float(cross.sum() / 2), second, float((cross * mean_distance).sum() / 3))
+    return float(cross.sum() / 2), second, float((cross * mean_distance).sum() / 3)
 
 
 def ring_edges(vertices: FloatArray) -> FloatArray:
@@ -114,22 +107,21 @@ def checked_polygon(name: str, vertices: Vertices, holes: Sequence[Vertices] = (
         If the polygon has more than `MOST_VERTICES`, a vertex is not finite or too far away, two
         vertices are at one place, or it crosses or touches itself or has no area.
     """
-    points = [*vertices, *(point for hole in holes for point in hole)]
+    rings = [np.asarray(ring, dtype=float).reshape(-1, 2) for ring in (vertices, *holes)]
+    points = np.vstack(rings)
     if len(points) > MOST_VERTICES:
         raise ValueError(f"box {name!r}: {len(points)} vertices, allowed: {MOST_VERTICES} or fewer")
-    for x, y in points:
-        if not max(abs(x), abs(y)) <= FARTHEST:
+    for x, y in points[~(np.abs(points) <= FARTHEST).all(axis=1)]:
+        raise ValueError(
+            f"box {name!r}: vertex ({x:g}, {y:g}), coordinates must be at most {FARTHEST:g} m"
+        )
+    for ring in rings:
+        steps = np.hypot(*(ring - np.roll(ring, 1, axis=0)).T)
+        for x, y in ring[steps < LEAST_EDGE]:
             raise ValueError(
-                f"box {name!r}: vertex ({x:g}, {y:g}), coordinates must be at most {FARTHEST:g} m"
+                f"box {name!r}: two vertices at the same place ({x:g}, {y:g}), allowed: each "
+                "once, the first not again at the end"
             )
-    for ring in (vertices, *holes):
-        for k, (x, y) in enumerate(ring):
-            before = ring[k - 1]
-            if np.hypot(x - before[0], y - before[1]) < LEAST_EDGE:
-                raise ValueError(
-                    f"box {name!r}: two vertices at the same place ({x:g}, {y:g}), allowed: each "
-                    "once, the first not again at the end"
-                )
     polygon = Polygon(vertices, holes)
     if not polygon.is_valid:
         raise ValueError(f"box {name!r}: not a simple polygon: {explain_validity(polygon)}")

@@ -1,5 +1,6 @@
 """Settings of the reward, of robots, boxes, sensors and failures."""
 
+import re
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union, get_args
 
 import numpy as np
@@ -87,22 +88,15 @@ def read_points(value: object) -> object:
         return value
     points = []
     for number, line in enumerate(active().text(value).splitlines(), 1):
-        cells = [cell.strip() for cell in line.split(",")]
-        is_header = number == 1 and not any(map(_is_number, cells))
-        if not line.strip() or is_header:
-            continue
-        if len(cells) != 2 or not all(map(_is_number, cells)):
-            raise ValueError(f"{value}:{number}: {line!r}, must be two numbers x,y in meters")
-        points.append((float(cells[0]), float(cells[1])))
+        is_header = number == 1 and not re.search(r"(^|,)\s*[-+.\d]", line)
+        if line.strip() and not is_header:
+            try:
+                x, y = map(float, line.split(","))
+            except ValueError:
+                problem = f"{line!r}, must be two numbers x,y in meters"
+                raise ValueError(f"{value}:{number}: {problem}") from None
+            points.append((x, y))
     return tuple(points)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 Vertices = Annotated[

@@ -174,26 +174,27 @@ def step_address() -> int | None:
         position=(1.25, -0.5), angle=0.75, linearVelocity=(0.5, -1.5), angularVelocity=2.5
     )
     body.CreateCircleFixture(radius=1.0, density=1.0)
-    memory = (ctypes.c_float * (TORQUE // 4 + 1)).from_address(int(body.this))
+    numbers = (ctypes.c_float * (TORQUE // 4 + 1)).from_address(int(body.this))
+    memory = np.frombuffer(numbers, np.float32)  # changes with the body
     flags = ctypes.c_uint16.from_address(int(body.this) + FLAGS)
     body.awake = False
     was_awake = bool(flags.value & AWAKE)
     flags.value |= AWAKE
     body.ApplyForceToCenter(PUSH[:2], True)
     body.ApplyTorque(PUSH[2], True)
-    pushed = [memory[FORCE // 4], memory[FORCE // 4 + 1], memory[TORQUE // 4]]
+    pushed = memory[[FORCE // 4, FORCE // 4 + 1, TORQUE // 4]].tolist()
     before = tuple(body.position)
     step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_float, ctypes.c_int32, ctypes.c_int32)(
         address
     )
     step(int(world.this), 0.016, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
-    places = (POSITION, POSITION + 4, ANGLE, VELOCITY, VELOCITY + 4, TURNING)
+    places = np.array([POSITION, POSITION + 4, ANGLE, VELOCITY, VELOCITY + 4, TURNING])
     state = [*body.position, body.angle, *body.linearVelocity, body.angularVelocity]
     is_as_expected = (
         not was_awake
         and body.awake
         and pushed == list(PUSH)
         and before != tuple(body.position)
-        and [memory[place // 4] for place in places] == state
+        and memory[places // 4].tolist() == state
     )
     return address if is_as_expected else None
