@@ -74,8 +74,6 @@ class KinematicChainSettings(ScenarioSettings):
     factory: ClassVar[str] = f"{__package__}.scenario:KinematicChain"
     joints: Annotated[int, Field(ge=2), team_size(1e-8)] = 4
     """Number of joints, one agent each. The maximum follows from estimated memory and time."""
-    joint_limit: Annotated[float, Field(gt=0, le=3.141592653589793)] | None = None
-    """Maximum angle of every joint except the base [rad]. By default unlimited; links can cross."""
     failures: tuple[Failure, ...] = ()
     """Failures of joints."""
     predictor: Literal["nominal", "informed"] = "nominal"

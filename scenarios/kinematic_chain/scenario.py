@@ -1,8 +1,7 @@
 """Kinematic chain: the joints of a planar arm learn to bring its tip to a goal.
 
 One agent per degree of freedom is the earlier application of the paper's method ([28, 29]). Joints
-are servo-driven and have no mass: they turn at the commanded speed unless they fail or reach their
-limit.
+are servo-driven and have no mass: they turn at the commanded speed unless they fail.
 """
 
 from __future__ import annotations
@@ -74,8 +73,6 @@ class KinematicChain(Scenario):
         self.action_set = ActionSet()
         self.length = REACH / n
         self._limits = np.full(n, settings.top_speed)
-        self._max_angles = np.full(n, settings.joint_limit or np.inf)
-        self._max_angles[0] = np.inf
         names = settings.state_space
         self._variables = [find_variable(CHAIN_VARIABLES, name) for name in names]
         self.state_space = space_of("+".join(names), SPEED, self._variables)
@@ -100,7 +97,7 @@ class KinematicChain(Scenario):
         """
         rng = np.random.default_rng(seed)
         n = len(self.agents)
-        bend = min(MAX_BEND, 3.0 * np.sqrt(2.0 / n), self.settings.joint_limit or np.inf)
+        bend = min(MAX_BEND, 3.0 * np.sqrt(2.0 / n))
         self._angles = np.append(rng.uniform(-np.pi, np.pi), rng.uniform(-bend, bend, n - 1))
         self._speeds: FloatArray = np.zeros(n)
         self._step = 0
@@ -124,7 +121,7 @@ class KinematicChain(Scenario):
         unit = self.settings.speed_increment * self._limits
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
         held = self._failures.driven(self._speeds, periods=1)[0]
-        self._angles = np.clip(angles + PERIOD * held, -self._max_angles, self._max_angles)
+        self._angles = angles + PERIOD * held
         self._step += 1
         moved = working_seconds()
         goal, settings = self._goal, self.settings
@@ -260,8 +257,7 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
         settings = arm.settings
         unit = settings.speed_increment * arm._limits
         self._speeds = arm.action_set.apply(self._speeds, joint_actions, unit, arm._limits)
-        turned = self._angles + PERIOD * self._speeds
-        self._angles = np.clip(turned, -arm._max_angles, arm._max_angles)
+        self._angles = self._angles + PERIOD * self._speeds
         self._steps += 1
         states, rewards, self._distance = arm.outcome(
             self._angles, self._speeds, self._goals, self._distance
@@ -275,7 +271,7 @@ class ChainEnvironments(StackedEnvironments[KinematicChain]):
 class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
     """Outcomes of joint actions, exact if the assumed effects of the joints are.
 
-    A decision turns each joint by its speed times the period, or up to its limit. The turn of each
+    A decision turns each joint by its speed times the period. The turn of each
     action of each joint is computed once; a joint action is then one posture.
 
     Parameters
@@ -316,9 +312,7 @@ class ChainPrediction(EmbodiedPrediction, RespondingPrediction):
         every = np.arange(len(arm.action_set))[:, None].repeat(len(angles), axis=1)
         unit = arm.settings.speed_increment * arm._limits
         commanded = arm.action_set.apply(speeds, every, unit, arm._limits)
-        after = np.clip(
-            angles + PERIOD * (gains * commanded + offsets), -arm._max_angles, arm._max_angles
-        )
+        after = angles + PERIOD * (gains * commanded + offsets)
         self.speeds = np.ascontiguousarray(commanded.T)
         self.turns = np.ascontiguousarray((after - angles).T)
         self._fractions = self.speeds / arm.settings.top_speed

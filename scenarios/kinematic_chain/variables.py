@@ -125,7 +125,7 @@ def approach(view: ChainView, joint: Joints) -> FloatArray:
 
 @state_variable("rad", -pi, pi, centers=(-2.5, -1.25, 0.0, 1.25, 2.5), mirrored="opposite")
 def angle(view: ChainView, joint: Joints) -> FloatArray:
-    """Angle of the joint within one turn, which matters if joints have limits."""
+    """Angle of the joint within one turn."""
     return (view.angles[joint] + pi) % (2.0 * pi) - pi
 
 

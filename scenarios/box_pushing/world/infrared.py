@@ -13,9 +13,8 @@ from ....core.numerics import FloatArray, njit
 from ...angles import rotate
 from .geometry import BoxShape, ray
 
-Response = tuple[float, float, int]
-"""Readings by distance, see `InfraredSettings`: distance beyond which they are 0 [m], distance over
-which an exponential reading falls to 1/e [m], and 0 for exponential, 1 for linear, 2 for binary."""
+Response = tuple[float, float]
+"""Distance beyond which readings are 0, and distance over which they fall to 1/e [m]."""
 
 
 class InfraredSensors(NamedTuple):
@@ -31,12 +30,8 @@ class InfraredSensors(NamedTuple):
 
 @njit(cache=True)
 def _reading(distance: float, response: Response) -> float:
-    reach, decay, kind = response
-    if distance >= reach:
-        return 0.0
-    if kind == 0:
-        return exp(-max(distance, 0.0) / decay)
-    return 1.0 - max(distance, 0.0) / reach if kind == 1 else 1.0
+    reach, decay = response
+    return exp(-max(distance, 0.0) / decay) if distance < reach else 0.0
 
 
 @njit(cache=True)

@@ -1,10 +1,10 @@
 """Settings of the reward, of robots, boxes, sensors and failures."""
 
 import re
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union, get_args
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Union
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from ....core.numerics import FloatArray
 from ....core.plugins.settings import Names, NonNegative, Positive, Settings
@@ -180,9 +180,6 @@ class RobotSettings(Settings):
         return self.traction * self.mass * GRAVITY / len(self.wheels)
 
 
-Normalization = Literal["exponential", "linear", "binary"]
-
-
 class InfraredSettings(Settings):
     """Response of the infrared sensors of all robots; the default is the e-Puck's.
 
@@ -194,29 +191,17 @@ class InfraredSettings(Settings):
 
     reach: Positive = 0.06
     """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
-    normalization: Normalization = "exponential"
-    """Reading in [0, 1] at a distance within reach: exp(-distance / decay), 1 - distance / reach,
-    or 1. When touching, it is 1."""
     decay: Positive = 0.015
-    """Distance over which an exponential reading falls to 1/e [m]."""
+    """Distance over which readings fall to 1/e [m]: within reach they are exp(-distance / decay), and
+    1 in contact."""
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Standard deviation of a normal error, as a fraction of the reading (as in lookup tables of
     Webots); drawn independently for every sensor and decision; the result is clipped to [0, 1]."""
 
-    @model_validator(mode="after")
-    def _decays(self) -> Self:
-        default = type(self).model_fields["decay"].default
-        if self.normalization != "exponential" and self.decay != default:
-            raise ValueError(
-                f"decay = {self.decay} is for normalization = 'exponential', "
-                f"received {self.normalization!r}"
-            )
-        return self
-
     @property
     def response(self) -> Response:
         """Constants of the response, for kernels."""
-        return self.reach, self.decay, get_args(Normalization).index(self.normalization)
+        return self.reach, self.decay
 
     def reading(self, distance: FloatArray) -> FloatArray:
         """Return the readings at distances [m] straight ahead; negative distances touch."""

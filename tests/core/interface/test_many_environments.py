@@ -10,7 +10,6 @@ from nested_agents.scenarios import SCENARIOS
 TABLES = {
     "spread": {"kind": "spread", "most_decisions": 7},
     "arm": {"kind": "kinematic-chain", "joints": 4, "most_decisions": 9},
-    "arm, limits": {"kind": "kinematic-chain", "joints": 5, "joint_limit": 1.0},
     "climbing": {"kind": "matrix-game", "game": "stochastic-climbing"},
     "three": {"kind": "matrix-game", "game": "three-agents", "observed": "above"},
     "polymatrix": {"kind": "team-game", "players": 5, "numbered": True},
@@ -25,7 +24,7 @@ TABLES = {
         "start": "easy",
         "state_space": "paper",
         "reward": {"of": "robot"},
-        "infrared": {"normalization": "linear"},
+        "infrared": {"decay": 0.03},
         "action_repeat": 3,
     },
     "box, wide": {"kind": "box-pushing", "robots": 4, "state_space": "wide", "box": "circle"},

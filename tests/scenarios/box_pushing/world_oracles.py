@@ -69,12 +69,7 @@ def infrared_readings_numpy(
         eye = robots[r, :2] + radii[r] * along
         (x, y), (dx, dy) = turn @ (eye - box[:2]), turn @ along
         distance = ray_numpy(shape, x, y, dx, dy, spec.reach)
-        near = {
-            "exponential": np.exp(-distance / spec.decay),
-            "linear": 1.0 - distance / spec.reach,
-            "binary": 1.0,
-        }
-        out[r, k] = near[spec.normalization] if distance < spec.reach else 0.0
+        out[r, k] = np.exp(-distance / spec.decay) if distance < spec.reach else 0.0
     return out
 
 

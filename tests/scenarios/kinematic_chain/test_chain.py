@@ -48,13 +48,12 @@ def moving(joints: int, seed: int = 0, **table: object) -> KinematicChain:
 @pytest.mark.parametrize("joints", [2, 20])
 def test_the_checker_finds_nothing(joints: int) -> None:
     failures = FAILURES[:3] if joints < 3 else FAILURES
-    for table in ({}, {"failures": failures, "joint_limit": 1.5, "state_space": BUILT_IN}):
+    for table in ({}, {"failures": failures, "state_space": BUILT_IN}):
         na.check_scenario(lambda table=table: arm(joints, **table), steps=8)
 
 
-@pytest.mark.parametrize("table", [{}, {"joint_limit": 0.4}])
-def test_predictions_come_true(table: dict[str, object]) -> None:
-    scenario, rng = moving(8, **table), np.random.default_rng(1)
+def test_predictions_come_true() -> None:
+    scenario, rng = moving(8), np.random.default_rng(1)
     actions = rng.integers(4, size=(20, 8))
     for action in actions:
         prediction = scenario.predict()
@@ -98,16 +97,6 @@ def test_a_state_variable_of_ones_own() -> None:
     assert [v.name for v in settings.build().state_space.variables] == [
         "speed", "distance", "height",
     ]  # fmt: skip
-
-
-def test_joints_stop_at_their_limit_and_the_base_has_none() -> None:
-    scenario = arm(3, joint_limit=0.3)
-    scenario.reset(0)
-    for _ in range(40):
-        scenario.step(np.zeros(3, dtype=int))
-    angles = scenario.measure()["angles"]
-    assert angles[1:] == pytest.approx([0.3, 0.3])
-    assert abs(angles[0]) > 0.3
 
 
 @pytest.mark.parametrize(
@@ -164,7 +153,6 @@ def test_it_brings_what_learns_best_and_a_spec_has_the_last_word() -> None:
     [
         ({"joints": 1}, "scenario.joints = 1"),
         ({"joints": 6000}, "scenario.joints = 6000"),
-        ({"joint_limit": 4.0}, "scenario.joint_limit = 4.0"),
         ({"failures": [{"kind": "free", "joints": "joint1"}]}, "free"),
         ({"state_space": ["gap"]}, "gap"),
         ({"state_space": ["distance", "distance"]}, "distinct"),

@@ -55,7 +55,7 @@ def are_equal(settings, number, monkeypatch, **options):
     ("settings", "options"),
     [
         ({"joints": 16}, {}),
-        ({"joints": 16, "joint_limit": 0.7}, {"explore": False}),
+        ({"joints": 16, "speed": 1.0}, {"explore": False}),
         ({"joints": 32, "predictor": "informed",
           "failures": [{"kind": "locked", "joints": "joint2"}]}, {"weights": "own"}),
         ({"joints": 3, "speed": 3.0}, {"backwards": True}),

@@ -131,4 +131,4 @@ def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert len(lines) <= 60
-    assert "[scenario.infrared]  reach, normalization, decay, noise" in lines
+    assert "[scenario.infrared]  reach, decay, noise" in lines

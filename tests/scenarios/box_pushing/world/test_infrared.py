@@ -1,7 +1,6 @@
 """Infrared sensors: known readings, and the kernel against its NumPy reference."""
 
 from math import exp
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     sensor_directions,
 )
-from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings, Normalization
+from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
 from nested_agents.scenarios.box_pushing.world.world import World
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -26,10 +25,9 @@ SPEC = InfraredSettings()
 RNG = np.random.default_rng(0)
 
 
-@pytest.mark.parametrize("normalization", get_args(Normalization))
 @pytest.mark.parametrize("box", ["square", "circle", "triangle"])
-def test_kernel_equals_its_reference(box: str, normalization: str) -> None:
-    spec = InfraredSettings(normalization=normalization)
+def test_kernel_equals_its_reference(box: str) -> None:
+    spec = InfraredSettings()
     rng = np.random.default_rng(7)
     shape = BOXES[box].shape
     radii = np.full(3, 0.037)
@@ -67,14 +65,6 @@ def test_touching_reads_one_and_far_reads_zero() -> None:
     np.testing.assert_array_equal(SPEC.reading(np.array([-0.001, 0.0, 0.06, 1.0])), [1, 1, 0, 0])
 
 
-def test_normalizations_by_hand() -> None:
-    at = np.array([0.0, 0.02, 0.0399, 0.04])
-    linear = InfraredSettings(reach=0.04, normalization="linear")
-    np.testing.assert_allclose(linear.reading(at), [1, 0.5, 0.0025, 0])
-    binary = InfraredSettings(reach=0.04, normalization="binary")
-    np.testing.assert_array_equal(binary.reading(at), [1, 1, 1, 0])
-
-
 def test_noise_is_a_fraction_of_the_reading() -> None:
     spec = InfraredSettings(noise=0.1)
     clean = np.tile([0.0, 0.2, 0.5, 1.0], (20_000, 1))
@@ -98,7 +88,7 @@ def rewards(infrared: dict[str, object], seed: int = 1) -> list[float]:
 def test_sensors_are_options_of_the_scenario() -> None:
     default = rewards({})
     assert rewards({"reach": 0.06, "decay": 0.015, "noise": 0.0}) == default
-    for change in ({"decay": 0.03}, {"normalization": "linear"}, {"reach": 0.001}):
+    for change in ({"decay": 0.03}, {"reach": 0.001}):
         assert rewards(change) != default
     noisy = rewards({"noise": 0.2})
     assert len(set(noisy)) == 5
@@ -111,8 +101,6 @@ def test_sensors_are_options_of_the_scenario() -> None:
     [
         ({"reach": 0}, "infrared.reach = 0"),
         ({"noise": 2}, "infrared.noise = 2"),
-        ({"normalization": "raw"}, "infrared.normalization = 'raw'"),
-        ({"normalization": "linear", "decay": 0.02}, "decay = 0.02 is for normalization"),
     ],
 )
 def test_bad_options_are_refused(table: dict[str, object], complaint: str) -> None:
