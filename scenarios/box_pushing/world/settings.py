@@ -192,7 +192,7 @@ class InfraredSettings(Settings):
     reach: Positive = 0.06
     """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
     decay: Positive = 0.015
-    """Distance over which readings fall to 1/e [m]. Within reach they are exp(-distance / decay)."""
+    """Distance over which readings, exp(-distance / decay) within reach, fall to 1/e [m]."""
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Standard deviation of a normal error, as a fraction of the reading (as in lookup tables of
     Webots); drawn independently for every sensor and decision; the result is clipped to [0, 1]."""
