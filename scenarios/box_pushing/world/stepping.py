@@ -175,7 +175,7 @@ def step_address() -> int | None:
     )
     body.CreateCircleFixture(radius=1.0, density=1.0)
     numbers = (ctypes.c_float * (TORQUE // 4 + 1)).from_address(int(body.this))
-    memory = np.frombuffer(numbers, np.float32)  # changes with the body
+    memory = np.ctypeslib.as_array(numbers)  # changes with the body
     flags = ctypes.c_uint16.from_address(int(body.this) + FLAGS)
     body.awake = False
     was_awake = bool(flags.value & AWAKE)
