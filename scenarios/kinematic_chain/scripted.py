@@ -100,8 +100,7 @@ class DampedLeastSquares(_Scripted):
 class CyclicCoordinateDescent(_Scripted):
     """Turns one joint after another so that the tip points at the goal."""
 
-    class Settings(EvaluatorSettings):
-        """The settings of the controller, which has none."""
+    Settings = EvaluatorSettings
 
     def _desired_turn(self, prediction: ChainPrediction, agent: int, places: FloatArray) -> float:
         x, y = places[-1] - places[agent]
