@@ -102,7 +102,7 @@ def failures(name: str, phase: str, condition: str) -> str:
     results = na.load(RESULTS / f"{name}.json").results
     steps = results.values(condition, "steps", phase)
     failed = results.success(condition, phase) == 0
-    away = steps[failed & (steps < results.step_limits.evaluation)]
+    away = steps[failed & (steps < results.step_limits[1])]
     words = f"{failed.sum()} failures, {len(away)} with the box too far from the goal"
     if len(away):
         words += f" (after {median(away.tolist()):.0f} decisions in the median)"

@@ -4,7 +4,6 @@ A study keeps its trained teams if its spec says so. Otherwise the training is r
 with the kept episodes. Either way, the explained team is the one that was measured.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from ...core.interface.spaces import Variable
 from ...core.numerics import FloatArray, pd
 from ...core.values.rule_base import RuleBase
 from ..errors import SpecError, refused
+from ..presentation.figures import file_stems
 from ..store.database import columns
 from ..store.durable import TEAM
 from ..store.store import Store
@@ -120,7 +120,5 @@ def _kept_rows(store: Store, trial: Trial) -> list[tuple[object, ...]]:
 
 def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
     """Return where the explanation of a trial is kept: one folder for each condition and seed."""
-    names = [re.sub(r"[^\w.=+-]+", "-", c)[:60].strip("-.") for c in conditions]
-    at = list(conditions).index(trial.condition)
-    name = names[at] if names.count(names[at]) == 1 and names[at] else f"condition{at + 1}"
-    return directory / "explain" / f"{name}-seed{trial.seed}"
+    stems = dict(zip(conditions, file_stems(conditions), strict=True))
+    return directory / "explain" / f"{stems[trial.condition]}-seed{trial.seed}"

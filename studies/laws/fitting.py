@@ -84,11 +84,11 @@ class Law(NamedTuple):
         """The law as an equation in n."""
         return f"{self.sample.scale.quantity} = {self.curve.formula(self.parameters)}"
 
-    def exponents(self, level: float = 0.95) -> dict[str, Estimate]:
+    def exponents(self) -> dict[str, Estimate]:
         """Return the meaning of the parameters, with Student intervals of resampled seeds."""
         values = self.curve.exponents(self.parameters)
         resampled = pd.DataFrame([self.curve.exponents(p) for p in self.resampled])
-        halves = student_quantile(self.seeds, level) * self._spread(resampled.to_numpy())
+        halves = student_quantile(self.seeds) * self._spread(resampled.to_numpy())
         return {
             name: Estimate(*map(np.asarray, (value, value - half, value + half)))
             for (name, value), half in zip(values.items(), halves, strict=True)

@@ -20,12 +20,12 @@ GRID_POINTS = 2001
 """Points at which an interpolated difference is tested."""
 
 
-def student_quantile(n_seeds: int, level: float = LEVEL) -> float:
+def student_quantile(n_seeds: int) -> float:
     """Return the two-sided quantile of Student's distribution for a mean over seeds."""
-    return float(special.stdtrit(n_seeds - 1, 0.5 + level / 2.0))
+    return float(special.stdtrit(n_seeds - 1, 0.5 + LEVEL / 2.0))
 
 
-def mean_interval(values: Array, level: float = LEVEL) -> Estimate:
+def mean_interval(values: Array) -> Estimate:
     """Return the mean of ``(n_seeds,)`` values with its Student interval.
 
     One seed has no interval: both ends are NaN.
@@ -40,19 +40,17 @@ def mean_interval(values: Array, level: float = LEVEL) -> Estimate:
     value = float(np.mean(values))
     if n_seeds < 2:
         return _estimate(value, math.nan, math.nan)
-    half = student_quantile(n_seeds, level) * float(np.std(values, ddof=1)) / math.sqrt(n_seeds)
+    half = student_quantile(n_seeds) * float(np.std(values, ddof=1)) / math.sqrt(n_seeds)
     return _estimate(value, value - half, value + half)
 
 
-def ratio_interval(numerator: Array, denominator: Array, level: float = LEVEL) -> Estimate:
+def ratio_interval(numerator: Array, denominator: Array) -> Estimate:
     """Return the positive ratio of two means over the same seeds with its Fieller interval.
 
     Parameters
     ----------
     numerator, denominator
         ``(n_seeds,)`` values, paired by seed; the numerator's mean is positive.
-    level
-        Confidence level.
 
     Returns
     -------
@@ -71,7 +69,7 @@ def ratio_interval(numerator: Array, denominator: Array, level: float = LEVEL) -
     value = top / bottom if bottom > 0.0 else math.inf
     if n_seeds < 2:
         return _estimate(value, math.nan, math.nan)
-    covariance = np.cov(numerator, denominator) / n_seeds * student_quantile(n_seeds, level) ** 2
+    covariance = np.cov(numerator, denominator) / n_seeds * student_quantile(n_seeds) ** 2
     square = bottom**2 - float(covariance[1, 1])
     linear = top * bottom - float(covariance[0, 1])
     constant = top**2 - float(covariance[0, 0])
@@ -93,9 +91,7 @@ def _positive_solutions(square: float, linear: float, constant: float) -> tuple[
     return min((constant / d for d in divisors if d > 0.0), default=math.inf), math.inf
 
 
-def sign_change(
-    sizes: Sequence[float], differences: Array, level: float = LEVEL
-) -> Estimate | None:
+def sign_change(sizes: Sequence[float], differences: Array) -> Estimate | None:
     """Return the size from which on the mean difference is positive, or None if there is none.
 
     Between measured sizes the differences are interpolated on a logarithmic scale. The interval
@@ -109,12 +105,10 @@ def sign_change(
         ``(n_sizes,)`` increasing sizes.
     differences
         ``(n_seeds, n_sizes)`` differences of paired seeds.
-    level
-        Confidence level.
     """
     positions = np.log(np.asarray(sizes, dtype=float))
     means = differences.mean(axis=0)
-    at_end = mean_interval(differences[:, -1], level)
+    at_end = mean_interval(differences[:, -1])
     not_positive = np.flatnonzero(means <= 0.0)
     if not float(at_end.low) > 0.0 or not len(not_positive):
         return None
@@ -125,9 +119,7 @@ def sign_change(
     weights = np.array([np.interp(grid, positions, unit) for unit in np.eye(len(positions))])
     interpolated = differences @ weights
     error = interpolated.std(axis=0, ddof=1) / math.sqrt(len(differences))
-    undecided = (
-        np.abs(interpolated.mean(axis=0)) <= student_quantile(len(differences), level) * error
-    )
+    undecided = np.abs(interpolated.mean(axis=0)) <= student_quantile(len(differences)) * error
     place = int(np.searchsorted(grid, crossing))
     undecided[place] = True
     decided_below = np.flatnonzero(~undecided[:place])

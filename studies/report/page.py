@@ -7,11 +7,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import jinja2
-import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ...core.plugins.words import show
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..presentation.growth import growth_figures
@@ -96,10 +94,8 @@ def page(directory: Path) -> str:
         scalability=scalability,
         panels=pictures({"scalability": scalability.figure()}, "panels") if scalability else [],
         replays=packed,
-        topologies=topologies(outline),
         hierarchies=drawn,
         failed=failed,
-        seeds=runs(outline.seeds),
         spec=dumps(outline.table),
         versions=versions(),
         results_version=results_version,
@@ -227,21 +223,6 @@ PACKAGES = (
 """Packages that compute results and figures."""
 
 
-def runs(values: Iterable[int]) -> str:
-    """Return sorted whole numbers in words; runs of three or more are given by their ends.
-
-    >>> runs([0, 1, 2, 3, 7, 9, 8, 20]), runs([1, 0])
-    ('0 to 3, 7 to 9, 20', '0, 1')
-    """
-    ordered = np.array(sorted(values), dtype=np.int64)
-    blocks = np.split(ordered, np.flatnonzero(np.diff(ordered) != 1) + 1)
-    parts = [
-        f"{block[0]} to {block[-1]}" if len(block) > 2 else ", ".join(map(str, block))
-        for block in blocks
-    ]
-    return ", ".join(parts)
-
-
 def extent(outline: StudyOutline) -> str:
     """Return the number of conditions, seeds, episodes and steps of a study in words."""
     after = ""
@@ -257,15 +238,6 @@ def extent(outline: StudyOutline) -> str:
         f"{outline.lengths.replace('episode', 'training episode')} of up to "
         f"{count(outline.steps, 'step')}{after}"
     )
-
-
-def topologies(outline: StudyOutline) -> dict[str, str]:
-    """Return the topologies in a spec as written there, by the part of the spec."""
-    own = {o["name"]: o for o in outline.table.get("overrides", ())}
-    tables = {"every condition": outline.table} | own | dict(outline.table.get("evaluations", {}))
-    return {
-        name: show(t["topology"], width=None) for name, t in tables.items() if t.get("topology")
-    }
 
 
 def standing(total: int, done: int, failed: int) -> str:

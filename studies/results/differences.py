@@ -200,7 +200,7 @@ def select_shared(values: Sequence[BySeed]) -> list[Array]:
     return [own.loc[seeds].to_numpy() for own in values]
 
 
-def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
+def difference(first: ArrayLike, second: ArrayLike) -> Estimate:
     """Return the first success rate minus the second, from outcomes ``(n_runs, n_episodes)``.
 
     The interval combines those of the two rates (Newcombe 1998; Zou and Donner 2008). It treats
@@ -213,7 +213,7 @@ def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Esti
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '1.00 [0.54, 1.00]'
     """
-    return difference_of_estimates(rate(first, level), rate(second, level))
+    return difference_of_estimates(rate(first), rate(second))
 
 
 def difference_of_estimates(first: Estimate, second: Estimate) -> Estimate:
@@ -224,7 +224,7 @@ def difference_of_estimates(first: Estimate, second: Estimate) -> Estimate:
     return Estimate(value, low, high)
 
 
-def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> Estimate:
+def ratio(numerator: ArrayLike, denominator: ArrayLike) -> Estimate:
     """Return the ratio of two success rates, from outcomes ``(n_runs, n_episodes)``.
 
     The interval combines those of the two rates as `difference` does (Donner and Zou 2012). Where
@@ -236,8 +236,8 @@ def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> 
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '0.75 [0.63, 0.92]'
     """
-    a = rate(numerator, level)
-    b = rate(denominator, level)
+    a = rate(numerator)
+    b = rate(denominator)
     if not b.value > 0.0:
         return exactly(np.nan)
     product = a.value * b.value

@@ -15,7 +15,7 @@ from ..errors import SpecError
 from ..spec.outline import StudyOutline
 from ..spec.tables import SpecTable, flat
 from ..trials.episodes import join_measures
-from .results import Results, StepLimits, assemble
+from .results import Results, assemble
 from .scores import name_key
 
 Part = tuple[StudyOutline, Results]
@@ -110,10 +110,10 @@ def _only_difference(
     (first, base), *others = specs.items()
     keys = dict.fromkeys(chain.from_iterable(specs.values()))
     differing = [key for key in keys if len({repr(own.get(key)) for own in specs.values()}) > 1]
-    swept = [key for key in differing if any(len(own.get(key, ())) > 1 for own in specs.values())]
-    named = [key for key in differing if size in (key, key.rpartition(".")[2])]
-    scenario = [key for key in differing if key.startswith("scenario.")]
-    (key, *_) = [*swept, *scenario, *differing, None] if size is None else [*named, None]
+    named = [k for k in differing if size is None or size in (k, k.rpartition(".")[2])]
+    is_swept = {k: any(len(own.get(k, ())) > 1 for own in specs.values()) for k in named}
+    # Swept keys first, then those of the scenario.
+    key = min(named, key=lambda k: (not is_swept[k], not k.startswith("scenario.")), default=None)
     rest = [other for other in differing if other != key]
     if rest:
         name, own = next((n, own) for n, own in others if own.get(rest[0]) != base.get(rest[0]))
@@ -182,10 +182,9 @@ def combine(
     usage = (name for part in parts for name in part.usage)
     measures = join_measures(part.measures for part in parts)
     results = assemble(episodes, trials, phases, columns, measures, usage)
-    # The limits of all studies together are known if each study's are.
-    limits = (
-        None if None in own else max(own)
-        for own in zip(*(part.step_limits for part in parts), strict=True)
-    )
+    limits = [part.step_limits for part in parts]
+    training, evaluation = (None if None in own else max(own) for own in zip(*limits, strict=True))
     pairs_episodes = any(part.pairs_episodes for part in parts)
-    return replace(results, step_limits=StepLimits(*limits), pairs_episodes=pairs_episodes), labels
+    return replace(
+        results, step_limits=(training, evaluation), pairs_episodes=pairs_episodes
+    ), labels

@@ -62,9 +62,7 @@ def friedman(values: ArrayLike, permutations: int = 9999, seed: int = 0) -> Frie
     return Friedman(statistic, (1 + reached) / (1 + permutations), statistic / (n * (k - 1)))
 
 
-def paired_permutation(
-    first: ArrayLike, second: ArrayLike, permutations: int = EXACT, seed: int = 0
-) -> float:
+def paired_permutation(first: ArrayLike, second: ArrayLike, permutations: int = EXACT) -> float:
     """Return the two-sided p of equal means of paired values ``(n_seeds,)``, by sign flips.
 
     All ``2 ** n_seeds`` sign patterns are tried if there are at most `permutations`. Sums that
@@ -96,7 +94,7 @@ def paired_permutation(
     # Differences of whole numbers are exact; others are off by units in the last place.
     is_whole = (one == np.rint(one)) & (other == np.rint(other))
     rounding = np.where(is_whole, 0.0, 2 * np.finfo(float).eps * (abs(one) + abs(other)))
-    reaching = _reaching(difference, rounding, _flips(n, permutations, seed))
+    reaching = _reaching(difference, rounding, _flips(n, permutations))
     if 2**n <= permutations:
         return float(reaching.mean())
     return float((1 + reaching.sum()) / (1 + permutations))
@@ -107,7 +105,7 @@ BITS = 8
 
 
 @lru_cache(maxsize=2)
-def _flips(n: int, permutations: int, seed: int) -> NDArray[np.uint8]:
+def _flips(n: int, permutations: int) -> NDArray[np.uint8]:
     """Return patterns of flipped signs as bytes ``(n / BITS, m)``: all, or randomly drawn ones.
 
     They are drawn in blocks, because all signs of a thousand seeds would take a gigabyte.
@@ -116,7 +114,7 @@ def _flips(n: int, permutations: int, seed: int) -> NDArray[np.uint8]:
     if 2**n <= permutations:
         return np.arange(2**n, dtype="<u4").view(np.uint8).reshape(-1, 4)[:, :parts].T.copy()
     numbers = np.empty((parts, permutations), dtype=np.uint8)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     for rows in blocks(permutations, n):
         # The highest bit is what `integers(0, 2)` returns, seven times faster.
         drawn = rng.integers(2**32, size=(rows.stop - rows.start, n), dtype=np.uint32)
@@ -169,7 +167,7 @@ SPARSE_PERMUTATIONS = 9999
 """Number of permutations of labels for more than `MANY_RUNS` runs."""
 
 
-def independent_permutation(first: ArrayLike, second: ArrayLike, seed: int = 0) -> float:
+def independent_permutation(first: ArrayLike, second: ArrayLike) -> float:
     """Return the two-sided p of equal means of two independent samples, by permutation of labels.
 
     All permutations are tried if there are at most `EXACT`. The result does not depend on the
@@ -190,7 +188,7 @@ def independent_permutation(first: ArrayLike, second: ArrayLike, seed: int = 0) 
         vectorized=True,
         n_resamples=n_permutations,
         batch=max(1, MAX_VALUES // n_runs),
-        rng=np.random.default_rng(seed),
+        rng=np.random.default_rng(0),
     )
     # SciPy's tolerance of ties does not grow with the values, but their rounding does.
     rounding = 16.0 * np.finfo(float).eps * max(float(abs(own).max()) for own in samples)

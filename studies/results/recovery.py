@@ -160,7 +160,7 @@ def recovery_by_seed(
         for condition in results.of_phase(phase)
         if "onset" in results.numbers(condition)
     }
-    measure = bounded(name, courses.values(), results.step_limits.training)
+    measure = bounded(name, courses.values(), results.step_limits[0])
     if phase != "training":
         measure = replace(measure, title=f"{measure.title}, {phase}")
     values = {c: pd.Series(own.measured[name], own.seeds).dropna() for c, own in courses.items()}

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,24 +39,20 @@ STEPS = Measure("steps", "steps", better="lower", least=0.0)
 """Length of an episode [decisions]."""
 
 
-class StepLimits(NamedTuple):
-    """Longest episode that is allowed [steps]; None where it is not known."""
-
-    training: int | None = None
-    evaluation: int | None = None
-
-    @classmethod
-    def of(cls, spec: SpecTable) -> StepLimits:
-        """Return the limits that a spec sets.
-
-        >>> StepLimits.of({"steps": 450}), StepLimits.of({"steps": 90, "evaluation_steps": 150})
-        (StepLimits(training=450, evaluation=450), StepLimits(training=90, evaluation=150))
-        """
-        steps = spec.get("steps")
-        return cls(steps, spec.get("evaluation_steps") or steps)
+StepLimits = tuple[int | None, int | None]
+"""Longest episode of training and of evaluation [steps]; None where it is not known."""
 
 
-UNLIMITED = StepLimits()
+def step_limits(spec: SpecTable) -> StepLimits:
+    """Return the limits that a spec sets.
+
+    >>> step_limits({"steps": 450}), step_limits({"steps": 90, "evaluation_steps": 150})
+    ((450, 450), (90, 150))
+    """
+    steps = spec.get("steps")
+    return steps, spec.get("evaluation_steps") or steps
+
+
 EVERY_EPISODE = slice(None)
 
 
@@ -81,14 +77,12 @@ class Results:
     """Names of the numbers that differ from run to run, times first."""
     pairs_episodes: bool = False
     """Whether conditions are compared on the episodes that both have, such as questions."""
-    step_limits: StepLimits = UNLIMITED
-    """Longest episode that the spec allows."""
+    step_limits: StepLimits = (None, None)
 
     def steps(self, phase: str) -> Measure:
         """Return the measure of the length of episodes, which ends at the longest allowed."""
-        limit = self.step_limits
         is_training = phase.partition(":")[0] in ("training", KEPT)
-        return replace(STEPS, greatest=limit.training if is_training else limit.evaluation)
+        return replace(STEPS, greatest=self.step_limits[0 if is_training else 1])
 
     @cached_property
     def conditions(self) -> tuple[str, ...]:
@@ -278,7 +272,7 @@ def read(store: Store) -> Results:
     results = assemble(
         [episodes], [trials], store.phases(), store.columns(), store.measures(), seconds + usage
     )
-    return replace(results, step_limits=StepLimits.of(store.spec()))
+    return replace(results, step_limits=step_limits(store.spec()))
 
 
 def assemble(

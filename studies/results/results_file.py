@@ -29,7 +29,7 @@ from ..spec.outline import StudyOutline
 from ..store.database import RESULTS_VERSION
 from ..store.durable import read_text
 from .json_files import Finite, checksum, explain, read_json
-from .results import Results, StepLimits
+from .results import Results, step_limits
 
 HEADER = "study.json"
 """Name of the file that describes the study of exported tables."""
@@ -224,7 +224,7 @@ class Header(BaseModel):
 
     def limited(self, results: Results) -> Results:
         """Return results with the limits of the spec."""
-        return replace(results, step_limits=StepLimits.of(self.outline.table))
+        return replace(results, step_limits=step_limits(self.outline.table))
 
 
 class ResultsFile(Header):

@@ -243,9 +243,9 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     return Estimate(p, np.minimum(low, p), np.maximum(high, p))
 
 
-def rates(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
+def rates(outcomes: ArrayLike) -> Estimate:
     """Return the `rate` of each column of outcomes ``(n_runs, n_points)``."""
-    return stack_estimates([rate(column[:, None], level) for column in np.asarray(outcomes).T])
+    return stack_estimates([rate(column[:, None]) for column in np.asarray(outcomes).T])
 
 
 def stack_estimates(estimates: Sequence[Estimate]) -> Estimate:
@@ -253,7 +253,7 @@ def stack_estimates(estimates: Sequence[Estimate]) -> Estimate:
     return Estimate(*np.array(estimates, dtype=float).T)
 
 
-def welch(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
+def welch(first: ArrayLike, second: ArrayLike) -> Estimate:
     """Return the difference of the means of two independent samples with Welch's interval.
 
     Two constant samples differ exactly.
@@ -268,7 +268,7 @@ def welch(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
     value = own.mean() - base.mean()
     if np.ptp(own) == np.ptp(base) == 0.0:
         return Estimate(value, value, value)
-    low, high = stats.ttest_ind(own, base, equal_var=False).confidence_interval(level)
+    low, high = stats.ttest_ind(own, base, equal_var=False).confidence_interval(0.95)
     return Estimate(value, np.asarray(low), np.asarray(high))
 
 

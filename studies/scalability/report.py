@@ -17,7 +17,7 @@ from ..results.notation import wrapped
 from ..results.results import Results
 from ..results.statistics import plain
 from ..spec.conditions import ConditionSettings
-from .analysis import Scalability, place_of_maximum
+from .analysis import Scalability
 from .data import collect
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class ScalabilityReport(Scalability, Report):
             "scaling": data.scaling,
             "performance": data.performance_title,
             "rows": [line._asdict() for line in self.summaries],
-            "laws": {name: self._law_to_dict(name) for name in self.universal_laws},
+            "laws": [line._asdict() for line in self.laws.lines],
             "best": best and dict(zip(("size", "hierarchies", "probability"), best, strict=True)),
             "best_sizes": {
                 name: {"size": size, "probability": probability}
@@ -100,17 +100,6 @@ class ScalabilityReport(Scalability, Report):
             "remarks": self.remarks,
         }
         return json.dumps(plain(content), indent=1)
-
-    def _law_to_dict(self, hierarchy: str) -> dict[str, object]:
-        law = self.universal_laws[hierarchy]
-        largest = self.data.sizes(hierarchy)[-1]
-        return {
-            "contention": law.contention,
-            "coherency": law.coherency,
-            "describes_times": law.is_plausible,
-            "best_size": law.best_size_within(largest),
-            "sentence": place_of_maximum(law, largest, self.data.size),
-        }
 
 
 def analyze(

@@ -198,7 +198,7 @@ def courses_of(results: Results) -> list[Course]:
             course = failure_course(results, condition, phase)
             adapts = ADAPTS.get((enabled, phase), phase)
             spans = _failure_spans(results.numbers(condition))
-            courses.append(Course(fault, adapts, spans, course, results.step_limits.training))
+            courses.append(Course(fault, adapts, spans, course, results.step_limits[0]))
     order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
     faults = distinct(course.fault for course in courses)
     return sorted(courses, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))

@@ -186,7 +186,7 @@ def test_folders_of_conditions_differ(tmp_path):
         explain.folder_of(tmp_path, SimpleNamespace(condition=name, seed=0), names).name
         for name in names
     ]
-    assert folders == ["condition1-seed0", "condition2-seed0", "x-seed0", "condition4-seed0"]
+    assert folders == ["a-b-seed0", "a-b-2-seed0", "x-seed0", "figure-seed0"]
 
 
 PARTITIONS = [

@@ -2,8 +2,6 @@ import Box2D
 import pytest
 
 from nested_agents.studies.report import page as words
-from nested_agents.studies.spec.outline import StudyOutline
-from nested_agents.studies.spec.spec import Spec
 
 
 @pytest.mark.parametrize(
@@ -18,15 +16,6 @@ from nested_agents.studies.spec.spec import Spec
 )
 def test_standing(counts, said):
     assert words.standing(*counts).startswith(said)
-
-
-def test_topologies_are_named_as_the_spec_writes_them():
-    failures = [{"kind": "lost", "agents": "*"}]
-    evaluations = {"far": {"box": "circle"}, "lost": {"topology": {"failures": failures}}}
-    outline = StudyOutline.of(Spec.of({"topology": "tree:2", "evaluations": evaluations}))
-    named = words.topologies(outline)
-    assert list(named) == ["every condition", "lost"]
-    assert named["lost"] == "{failures = [{kind = 'lost', agents = '*'}]}"
 
 
 def test_places_of_the_machine_are_shortened():

@@ -25,6 +25,7 @@ from nested_agents.studies.results.results import (
     StepLimits,
     describe_number,
     from_arrays,
+    step_limits,
 )
 from nested_agents.studies.results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 
@@ -73,7 +74,7 @@ def lengths(steps: list[list[int]], limits: StepLimits) -> Results:
 
 def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
     """Of 150, 150 and 100 steps Student's interval would reach from 62 to 205."""
-    results = lengths([[150], [150], [100]], StepLimits(450, 150))
+    results = lengths([[150], [150], [100]], (450, 150))
     estimate = estimate_of(results, "a", "evaluation", STEPS)
     assert float(estimate.high) == 150.0
     assert float(estimate.low) == pytest.approx(400 / 3 - 4.3027 * 28.868 / 3**0.5, abs=0.1)
@@ -81,7 +82,7 @@ def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
         float(compare_conditions(results, "steps").table[0].estimates["evaluation steps"].high)
         == 150.0
     )
-    equal = estimate_of(lengths([[25]] * 8, StepLimits(25, 25)), "a", "evaluation", STEPS)
+    equal = estimate_of(lengths([[25]] * 8, (25, 25)), "a", "evaluation", STEPS)
     assert tuple(map(float, equal)) == (25.0, 25.0, 25.0)
 
 
@@ -90,7 +91,7 @@ def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
     [({"steps": 90}, 90, 90), ({"steps": 90, "evaluation_steps": 150}, 90, 150), ({}, None, None)],
 )
 def test_the_longest_episode_is_that_of_the_spec(spec, training, evaluation) -> None:
-    results = lengths([[1], [2]], StepLimits.of(spec))
+    results = lengths([[1], [2]], step_limits(spec))
     phases = ("training", "training:first", "weights kept", "evaluation", "evaluation:b", "after 9")
     limits = [training] * 3 + [evaluation] * 3
     assert [results.steps(phase).greatest for phase in phases] == limits
