@@ -15,7 +15,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.learners.fitted_q import FittedQSettings
 from nested_agents.core.learners.learner import LearnerSettings, TeamSettings
-from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
 from nested_agents.core.search.budget import divide
 from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
@@ -166,6 +166,21 @@ def test_learners_of_action_values_try_each_own_action() -> None:
 
 def fitted(budget: int) -> LearnerSettings:
     return FittedQSettings(decision=DecisionSettings(budget=budget))
+
+
+@pytest.mark.parametrize("topology", ["chain", "tree", "star", "independent"])
+def test_best_responses_of_zero_weights_are_the_same_with_any_budget(topology: str) -> None:
+    scenario = Pairs(4)
+    hierarchy = build(topology, scenario.agents, scenario.groups)
+    actions = []
+    for budget in (None, 24, 1024):
+        decision = DecisionSettings(evaluator="best-response", budget=budget)
+        learner = FrozenSettings(decision=decision)
+        team = Team(learner, scenario, hierarchy, policy_seed(0))
+        loop = control_loop(scenario, team, episodes=2, steps=STEPS, seed=0)
+        actions.append([step.joint_action.tolist() for step in loop])
+        assert team.counts.joint_actions == 0
+    assert actions[0] == actions[1] == actions[2]
 
 
 def test_searches_that_cannot_keep_to_a_budget_are_refused() -> None:
