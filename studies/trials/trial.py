@@ -132,6 +132,14 @@ class Trial:
             return f"{self.decisions} decisions"
         return lengths([[stage.episodes for stage in self.curriculum]], self.episodes)
 
+    @property
+    def max_steps(self) -> int:
+        """Maximum number of steps of all its episodes."""
+        episodes = self.episodes + sum(stage.episodes for stage in self.curriculum)
+        evaluated = self.evaluation * (1 + len(self.evaluations))
+        training = episodes * self.steps if self.decisions is None else self.decisions
+        return training + evaluated * (self.evaluation_steps or self.steps)
+
     @cached_property
     def recorded(self) -> dict[int, str]:
         """Names of the recorded training episodes, by number.

@@ -76,10 +76,13 @@ def end_with_parent(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
+def attempt(
+    run_trial: RunTrial, trial: Trial, failure: type[BaseException] = BaseException
+) -> Outcome:
     """Run one trial and return its result or its traceback.
 
     SystemExit and KeyboardInterrupt are failures of the trial, too, because workers ignore Ctrl-C.
+    Exceptions that are no `failure` are raised.
     """
     from ...core.numerics import working_seconds  # status does without NumPy
 
@@ -89,7 +92,7 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
     try:
         with trial.sources.active():
             result = run_trial(trial)
-    except BaseException:
+    except failure:
         error = storable(traceback.format_exc())
     return Outcome(trial, error, working_seconds() - start, result)
 

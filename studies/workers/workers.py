@@ -9,7 +9,8 @@ import os
 import re
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -24,7 +25,16 @@ from ...core.shell import command_line
 from ..errors import SpecError
 from ..trials.trial import Trial
 from .fork_server import Answer, call_for, describe_exit
-from .runner import ONE_THREAD, Backend, Outcome, RunTrial, Workers, cores, end_with_parent
+from .runner import (
+    ONE_THREAD,
+    Backend,
+    Outcome,
+    RunTrial,
+    Workers,
+    attempt,
+    cores,
+    end_with_parent,
+)
 
 
 def check_jobs(jobs: int) -> None:
@@ -69,7 +79,8 @@ def start_workers(
     backend
         Kind of workers.
     jobs
-        Maximum number of trials at a time; None: one for each core or worker of the cluster.
+        Maximum number of trials at a time; None: one for each core or worker of the cluster, see
+        also `ShortFirst`.
     address
         Address of the scheduler of a running Dask cluster; None: start workers on this machine.
     trials
@@ -84,7 +95,8 @@ def start_workers(
     wanted = max(1, min(jobs or cores(), trials))
     with safe_path():
         if backend == "loky":
-            yield LokyWorkers(wanted)
+            has_one_thread = os.environ.items() >= ONE_THREAD.items()
+            yield (ShortFirst if jobs is None and has_one_thread else LokyWorkers)(wanted)
             return
         try:
             from .dask import DaskWorkers
@@ -183,3 +195,51 @@ class LokyWorkers(Workers[Future[Outcome | Answer]]):
         while any(not (f.running() or f.done()) for f in futures) and time.monotonic() < until:
             time.sleep(0.01)  # otherwise a thread of loky ends with a traceback
         self._executor.shutdown(wait=True, kill_workers=True)
+
+
+HERE_S = 1.0
+"""Processor time for which `ShortFirst` runs trials before it starts workers [s]."""
+
+MAX_SHORT_DECISIONS = 1_000
+"""Maximum number of decisions of all agents in a short trial."""
+
+
+class ShortFirst(LokyWorkers):
+    """Workers that start after this process itself has run short trials for a second.
+
+    A study of a few short trials needs no workers, whose start takes longer than its trials.
+
+    Parameters
+    ----------
+    jobs
+        Number of processes, at least 1.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        super().__init__(jobs)
+        self._until = time.process_time() + HERE_S
+
+    def arrivals(
+        self,
+        trials: Sequence[Trial],
+        run_trial: RunTrial,
+        started: Callable[[str], None],
+        ended: Callable[[str], None],
+    ) -> Generator[Outcome]:
+        """Run trials and yield their outcomes, see `Workers.arrivals`."""
+        left = deque(trials)
+        while left and time.process_time() < self._until and _is_short(left[0]):
+            trial = left.popleft()
+            started(trial.identity)
+            outcome = attempt(run_trial, trial, Exception)  # Ctrl-C interrupts the study
+            ended(trial.identity)
+            yield outcome
+        yield from super().arrivals(left, run_trial, started, ended)
+
+
+def _is_short(trial: Trial) -> bool:
+    """Return whether a trial takes well below a second and runs no user code."""
+    if trial.sources.runs_foreign_code:
+        return False
+    scenario, _ = trial.settings.arrange(trial.world())
+    return trial.max_steps * len(scenario.agents) <= MAX_SHORT_DECISIONS

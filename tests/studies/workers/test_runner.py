@@ -18,11 +18,18 @@ from nested_agents.studies.spec.tables import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers import workers
-from nested_agents.studies.workers.runner import ATTEMPTS, MAX_ERROR_LENGTH, attempt, run_trials
+from nested_agents.studies.workers.runner import (
+    ATTEMPTS,
+    MAX_ERROR_LENGTH,
+    ONE_THREAD,
+    attempt,
+    run_trials,
+)
 from nested_agents.studies.workers.workers import (
     REPLACED_WARNING,
     Backend,
     LokyWorkers,
+    ShortFirst,
     check_workers,
     start_workers,
 )
@@ -173,6 +180,43 @@ def test_whoever_stops_waits_for_no_trial():
     begin = time.monotonic()
     arriving.close()
     assert time.monotonic() - begin < 60
+
+
+def test_short_trials_need_no_worker_and_give_the_same_rows(tmp_path, monkeypatch, uninterrupted):
+    with made_up.opened(tmp_path / "study") as store, monkeypatch.context() as patch:
+        patch.setattr(LokyWorkers, "submit", None)
+        outcomes = list(run_trials(made_up.TRIALS, store, made_up.measure, ShortFirst(2)))
+        assert [o.error for o in outcomes] == [None] * len(made_up.TRIALS)
+        assert content(store) == uninterrupted
+
+
+@pytest.mark.parametrize("limit", ["HERE_S", "MAX_SHORT_DECISIONS"])
+def test_trials_that_are_not_short_run_on_workers(monkeypatch, limit):
+    monkeypatch.setattr(workers, limit, 0)
+    monkeypatch.setattr(workers, "attempt", None)  # of this process
+    outcomes = [*ShortFirst(2).arrivals(made_up.TRIALS[:2], made_up.measure, print, print)]
+    assert [outcome.error for outcome in outcomes] == [None, None]
+
+
+def test_ctrl_c_in_a_short_trial_interrupts_the_study_and_fails_no_trial(tmp_path):
+    def interrupted(trial):
+        raise KeyboardInterrupt
+
+    with made_up.opened(tmp_path) as store:
+        with pytest.raises(KeyboardInterrupt):
+            list(run_trials(made_up.TRIALS, store, interrupted, ShortFirst(2)))
+        assert store.failed() == []
+
+
+@pytest.mark.parametrize("name", ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"])
+def test_a_process_of_many_threads_or_a_number_of_jobs_calls_for_workers(monkeypatch, name):
+    for variable in ONE_THREAD:
+        monkeypatch.setenv(variable, "1")
+    with start_workers("loky", None, None, 2) as short, start_workers("loky", 2, None, 2) as jobs:
+        assert [type(short), type(jobs)] == [ShortFirst, LokyWorkers]
+    monkeypatch.delenv(name)
+    with start_workers("loky", None, None, 2) as several:
+        assert type(several) is LokyWorkers
 
 
 @pytest.mark.parametrize(("jobs", "trials", "expected"), [(512, 3, 3), (1, 3, 1), (2, 0, 1)])
