@@ -49,7 +49,7 @@ def decisions_a_second(
     many = world.environments(environments)
     if many is None:
         raise ValueError(f"{kind}: steps one world at a time")
-    loop = ManyEnvironmentsLoop(many, world, team, 150, 10_000)
+    loop = ManyEnvironmentsLoop(many, team, 150, 10_000)
     if updates:
         for _ in range(size):  # the first rollout compiles and makes room
             loop.step()

@@ -69,7 +69,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
             transition = scenario.step(decision.joint_action)
             last = transition.terminated or transition.truncated or step == STEPS - 1
             team.learn(Experience(seen, decision, transition, last))
-            box, *bodies = transition.twists
+            box, *bodies = transition.measured_twists()
             if len(bodies) == len(scenario.groups) and np.hypot(*box[:2]) > 0.002:
                 off = np.hypot(*(predicted[:, 0] - box)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)

@@ -24,13 +24,7 @@ PAPER_ITERATIONS = 450
 
 @dataclass(frozen=True)
 class Problem:
-    """Quantities that all formulas share.
-
-    Raises
-    ------
-    ValueError
-        If a quantity is too small, or n is below 1.
-    """
+    """Quantities that all formulas share, all above 0."""
 
     rules: int = PAPER_RULES
     """|S_n|, number of states (rules) of one agent."""
@@ -38,12 +32,6 @@ class Problem:
     """|A|, number of actions of one agent, at least 2."""
     iterations: int = PAPER_ITERATIONS
     """L, number of iterations."""
-
-    def __post_init__(self) -> None:
-        least = {"rules": 1, "actions": 2, "iterations": 1}
-        for name, value in vars(self).items():
-            if value < least[name]:
-                raise ValueError(f"{name} = {value}, allowed: {least[name]} or more")
 
     def nested(self, below: Iterable[int]) -> int:
         """Return the cost of any hierarchy (Eq. 18, generalized).
@@ -76,7 +64,6 @@ class Problem:
 
         ``L * |S| * ((|A|^2)^(n+1) - |A|^2) / (|A|^2 - 1)``; the division leaves no remainder.
         """
-        _check(n)
         square = self.actions**2
         return self.iterations * self.rules * ((square ** (n + 1) - square) // (square - 1))
 
@@ -90,7 +77,6 @@ class Problem:
         >>> Problem().chain_asymptotic(4)
         Fraction(2457600000000, 1)
         """
-        _check(n)
         square = self.actions**2
         return self.iterations * self.rules * square**n * Fraction(square, square - 1)
 
@@ -104,7 +90,6 @@ class Problem:
         >>> f"{Problem().single_agent(4):.4e}"
         '1.0986e+27'
         """
-        _check(n)
         return self.iterations * self.rules**n * self.actions ** (2 * n)
 
     def decision(self, below: Iterable[int]) -> int:
@@ -131,8 +116,3 @@ def is_chain(below: Iterable[int]) -> bool:
     """
     counts = sorted(below)
     return counts == list(range(len(counts)))
-
-
-def _check(n: int) -> None:
-    if n < 1:
-        raise ValueError(f"n = {n}, allowed: 1 or more")

@@ -12,8 +12,26 @@ MESSAGES = Measure("messages", "messages", gathering="sum", better="lower", leas
 """Number of received messages, a measure of teams that send payloads."""
 
 
-class DecisionCosts:
-    """Costs of the decisions of all parts.
+def total_costs(
+    parts: Sequence[AnyAgents],
+    inputs: Sequence[object],
+    joint_action: IntArray,
+    measures: Sequence[Measure],
+    n_received: int,
+) -> Mapping[str, float]:
+    """Return the costs of a decision by the names of `measures`, see `join_costs`."""
+    total = {measure.name: 0.0 for measure in measures}
+    if MESSAGES.name in total:
+        total[MESSAGES.name] = float(n_received)
+    for part, own in zip(parts, inputs, strict=True):
+        if isinstance(part, ReportsCosts):
+            for name, value in part.decision_costs(own, joint_action).items():
+                total[name] += value
+    return total
+
+
+def join_costs(parts: Sequence[AnyAgents], *, counts_messages: bool) -> tuple[Measure, ...]:
+    """Return the measures of the costs of all parts, each once.
 
     Parameters
     ----------
@@ -22,44 +40,14 @@ class DecisionCosts:
     counts_messages
         Whether the number of received messages is a cost.
 
-    Attributes
-    ----------
-    measures
-        Measures of the costs.
-
     Raises
     ------
     ValueError
         If two parts report one cost in different units; one line.
     """
-
-    def __init__(self, parts: Sequence[AnyAgents], *, counts_messages: bool) -> None:
-        self._parts = {k: p for k, p in enumerate(parts) if isinstance(p, ReportsCosts)}
-        sent = [MESSAGES] if counts_messages else []
-        own = [measure for part in self._parts.values() for measure in part.costs]
-        self.measures = join_costs([*sent, *own])
-
-    def total(
-        self, inputs: Sequence[object], joint_action: IntArray, n_received: int
-    ) -> Mapping[str, float]:
-        """Return the costs of a decision by the names of `measures`."""
-        total = {measure.name: 0.0 for measure in self.measures}
-        if MESSAGES.name in total:
-            total[MESSAGES.name] = float(n_received)
-        for k, part in self._parts.items():
-            for name, value in part.decision_costs(inputs[k], joint_action).items():
-                total[name] += value
-        return total
-
-
-def join_costs(measures: Sequence[Measure]) -> tuple[Measure, ...]:
-    """Return the measures of the costs of all parts, each once.
-
-    Raises
-    ------
-    ValueError
-        If two parts report one cost in different units; one line.
-    """
+    measures = [MESSAGES] if counts_messages else []
+    for part in parts:
+        measures += part.costs if isinstance(part, ReportsCosts) else ()
     by_name: dict[str, Measure] = {}
     for measure in measures:
         known = by_name.setdefault(measure.name, measure)

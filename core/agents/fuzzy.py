@@ -13,22 +13,22 @@ import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox
-from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
+from ..interface.agents import AgentContext, Agents, Counts, StateDict, add_prefix, select_prefix
 from ..interface.experience import Experience, Observation
 from ..interface.measures import Measure
 from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
-from ..interface.scenario import Members, Scenario, carried_rows, rows_of
+from ..interface.scenario import carried_rows, owners_of, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..models.predictors import GivenPredictor, Mirror
 from ..models.team_model import TeamModel
 from ..numerics import AnyArray, FloatArray, IntArray, greatest, set_words, words_of
 from ..plugins.words import must_inherit
-from ..search.evaluator import Aggregation, DecisionContext, Evaluator
+from ..search.evaluator import NO_AGENTS, Aggregation, DecisionContext, Evaluator
 from ..search.exploration import Explorer
 from .action_counts import ActionCounts
 from .team_search import TeamSearch
-from .views import FuzzyInputs, OwnView, Views, agreement, senders_of, weights_by_agent
+from .views import FuzzyInputs, Views, agreement, senders_of, weights_by_agent
 
 
 class FuzzyAgents(Agents[FuzzyInputs]):
@@ -102,7 +102,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self.search.is_private:
             plans = isinstance(self.evaluator, Aggregation) and self.evaluator.plans
             n_rules = self.learner.theta.shape[1]
-            self.views = Views(settings, context, self._row_of, n_rules, self.model, plans=plans)
+            self.views = Views(settings, context, self._row_of, n_rules, plans=plans)
             self.costs = self.views.costs
         self.explorer: Explorer = settings.exploration.build(n)
         must_inherit("learner.exploration.kind", self.explorer, Explorer)
@@ -151,46 +151,47 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             weights=weights_by_agent(self._row_of, theta),
             frequencies=self.action_counts.frequencies,
             explore=explore,
-            views={} if self.views is None else self.views.by_agent(seen, prediction, theta),
+            views={} if self.views is None else self.views.by_agent(prediction, theta),
         )
 
-    def _joint_search(self, inputs: FuzzyInputs) -> IntArray | None:
+    def _context(
+        self, inputs: FuzzyInputs, agent: int, known: IntArray, senders: IntArray = NO_AGENTS
+    ) -> DecisionContext:
+        """Return the knowledge of an agent that decides, given the known actions ``(n,)``."""
+        prediction, weights = inputs.views.get(agent, (inputs.prediction, inputs.weights))
+        return DecisionContext(
+            agent=agent,
+            joint_action=known,
+            prediction=prediction,
+            weights=weights,
+            frequencies=inputs.frequencies,
+            rng=self.rng,
+            given=self.action_counts.frequencies_given(agent),
+            told=senders,
+            present=inputs.left,
+        )
+
+    def _joint_search(self, inputs: FuzzyInputs, first: int) -> IntArray | None:
         """Return the joint action ``(n,)`` of one search for all agents, or None."""
         exploring = self.explorer.exploring if inputs.explore else NOT_EXPLORING
         if self.evaluator is None or exploring is None:
             return None
-        first = DecisionContext(
-            agent=self.search.hierarchy.order[0],
-            joint_action=self._neutral.copy(),
-            prediction=inputs.prediction,
-            weights=inputs.weights,
-            frequencies=inputs.frequencies,
-            rng=self.rng,
-            present=inputs.left,
-        )
-        return self.evaluator.decide(first, exploring)
+        return self.evaluator.decide(self._context(inputs, first, self._neutral.copy()), exploring)
 
     def act(self, inputs: FuzzyInputs, inbox: Inbox) -> IntArray:
-        """Return the actions ``(k,)`` of the agents of a stage, one after the other.
+        """Return the action ``(1,)`` of the only agent of a stage.
 
         If all agents receive all earlier actions, one search in the first stage may find them all.
         """
+        (agent,) = inbox.agents.tolist()
         if self.evaluator is None:
-            return self.rng.integers(len(self.action_set), size=len(inbox.agents))
-        is_first = inbox.agents[0] == self.search.hierarchy.order[0]
+            return self.rng.integers(len(self.action_set), size=1)
+        is_first = agent == self.search.hierarchy.order[0]
         if self.search.is_joint and is_first and inputs.values is None:
-            inputs.joint_action = self._joint_search(inputs)
+            inputs.joint_action = self._joint_search(inputs, agent)
         if inputs.joint_action is not None:
             return inputs.joint_action[inbox.agents]
-        if len(inbox.agents) == 1:
-            return np.array(
-                [self._choose(inputs, int(inbox.agents[0]), inbox.senders, inbox.actions)]
-            )
-        chosen = []
-        for agent in inbox.agents.tolist():
-            own = inbox.receivers == agent
-            chosen.append(self._choose(inputs, agent, inbox.senders[own], inbox.actions[own]))
-        return np.array(chosen)
+        return np.array([self._choose(inputs, agent, inbox.senders, inbox.actions)])
 
     def _choose(self, inputs: FuzzyInputs, agent: int, senders: IntArray, actions: IntArray) -> int:
         """Return the action of an agent, given the received actions."""
@@ -203,20 +204,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if self._senders:
             told = known[self._senders[agent]]
             inputs.left[agent, self.scenario.state_space.n_variables :][: len(told)] = told
-        view = inputs.views.get(agent) or OwnView(inputs.prediction, inputs.weights)
-        values = self.evaluator.values(
-            DecisionContext(
-                agent=agent,
-                joint_action=known,
-                prediction=view.prediction,
-                weights=view.weights,
-                frequencies=inputs.frequencies,
-                rng=self.rng,
-                given=self.action_counts.frequencies_given(agent),
-                told=senders,
-                present=inputs.left,
-            )
-        )
+        values = self.evaluator.values(self._context(inputs, agent, known, senders))
         if len(values) != len(self.action_set):
             raise ValueError(
                 f"the evaluator returned {len(values)} values for {len(self.action_set)} actions"
@@ -274,16 +262,12 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         """Update predictor and weights; after the last step, also learn from the episode."""
         self.model.learn(experience, inputs.prediction)
         transition = experience.transition
-        states = transition.states
+        states = transition.states[self.members]
+        left = inputs.left[self.members]
+        taken = experience.decision.joint_action[self.members]
         reward = transition.reward
-        left = inputs.left
-        taken = experience.decision.joint_action
-        if len(self.members) < len(taken):
-            states = states[self.members]
-            left = left[self.members]
-            taken = taken[self.members]
-            if np.ndim(reward):
-                reward = np.asarray(reward)[self.members]
+        if np.ndim(reward):
+            reward = np.asarray(reward)[self.members]
         if transition.terminated and not transition.absorbing:
             # Learners assume that a terminal state is repeated forever.
             reward = reward * (1.0 - self.settings.discount)
@@ -295,26 +279,15 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         updates = self.learner.observe_decision(
             left, taken, states, reward, transition.terminated, experience.duration
         )
-        self.count(updates)
         if experience.last:
-            self.end_episode()
-
-    def end_episode(self) -> None:
-        """Make the updates that follow an episode."""
-        self.count(self.learner.end_episode())
-        self.model.end_episode()
-
-    def count(self, updates: int) -> None:
-        """Count changed weights."""
+            updates += self.learner.end_episode()
+            self.model.end_episode()
         self.counts.weight_updates += updates
 
-    def _carried_rows(self, other: Scenario, members: IntArray) -> IntArray:
-        """Return the row of these weights from which every row in another scenario starts."""
-        return carried_rows(
-            Members(self.scenario, self.members),
-            Members(other, members),
-            shared=self.settings.weights == "role",
-        )
+    @property
+    def _owners(self) -> list[str]:
+        """The owner of each member's weights."""
+        return owners_of(self.scenario, self.members, shared=self.settings.weights == "role")
 
     def warm_start(self, former: Self) -> None:
         """Start from agents with the same settings that learned in another scenario.
@@ -327,7 +300,13 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         ValueError
             If the learner or the exploration does not support it; one line.
         """
-        rows = former._carried_rows(self.scenario, self.members)
+        rows = carried_rows(
+            former.scenario,
+            self.scenario,
+            former._owners,
+            self._owners,
+            shared=self.settings.weights == "role",
+        )
         self.learner.warm_start(former.learner, rows)
         self.explorer.warm_start(former.explorer)
         self.rng.bit_generator.state = former.rng.bit_generator.state
@@ -343,9 +322,9 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             "explorer": self.explorer.memory,
             **self.action_counts.state_dict(),
         }
-        memory |= {f"learner.{key}": array for key, array in self.learner.state_dict().items()}
+        memory |= add_prefix("learner.", self.learner.state_dict())
         for name, part in self.model.adaptive.items():
-            memory |= {f"{name}.{key}": array for key, array in part.state_dict().items()}
+            memory |= add_prefix(f"{name}.", part.state_dict())
         return memory
 
     def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
@@ -362,8 +341,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
                 f"team: saved arrays {', '.join(sorted(state))} are not this team's "
                 f"{', '.join(sorted(own))}"
             )
-        fixed = [f"learner.{name}" for name in self.learner.fixed_arrays]
-        for name in [*fixed, "seen", "explorer", "generator"]:
+        for name in ("learner.theta", "learner.trace", "seen", "explorer", "generator"):
             if name in own and state[name].shape != own[name].shape:
                 raise ValueError(
                     f"team: saved {name} has shape {state[name].shape}, this team's "

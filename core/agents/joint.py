@@ -26,6 +26,7 @@ from ..interface.prediction import Assumptions, EmbodiedPrediction, Prediction
 from ..interface.scenario import Scenario, Transition, checked_scenario
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics import FloatArray, IntArray
+from ..search.enumeration import combinations
 
 Granularity = Literal["actuator", "body", "team"]
 """Part of a team that one agent controls."""
@@ -130,17 +131,15 @@ class JointAgents(Scenario):
         shared = space.variables[self._n_each :]
         own = [replace(v, name=f"{agent}.{v.name}") for agent in of_block for v in repeated]
         name = f"joint {space.name}" if self.whole else f"bodies' {space.name}"
-        sources = [v.name for _ in of_block for v in repeated] + [v.name for v in shared]
         variables = (*own, *shared)
-        taken = [v.name for v, n in zip(variables, sources, strict=True) if n in space.actions]
+        taken = [v.name for v in variables if v.name.rpartition(".")[2] in space.actions]
         self.state_space = StateSpace(
             name, variables, 0 if self.whole else len(own), actions=tuple(taken)
         )
         # Row c holds the actions of a block's agents of index c.
-        shape = (len(single),) * len(self.blocks[0])
-        self._local = np.indices(shape).reshape(len(shape), -1).T.copy()
+        self._local = combinations(self.blocks[0], len(single))
         names = tuple("+".join(single.names[a] for a in row) for row in self._local)
-        neutral = int(np.ravel_multi_index((single.neutral,) * len(shape), shape))
+        neutral = int(np.flatnonzero((self._local == single.neutral).all(axis=1))[0])
         zeros = (0.0,) * len(names)
         self.action_set = ActionSet(names, zeros, zeros, neutral)
 

@@ -8,9 +8,6 @@ process. If the option lasts k decisions with rewards r_1 to r_k, the leader lea
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
@@ -29,16 +26,6 @@ from .views import FuzzyInputs
 
 INBOX = Inbox(np.zeros(1, np.int64), NO_AGENTS, NO_AGENTS, NO_AGENTS)
 """A leader has no superior that sends it messages."""
-
-
-@contextmanager
-def keys_below(table: str) -> Iterator[None]:
-    """Put the name of the enclosing table before the keys of a learner in error messages."""
-    try:
-        yield
-    except ValueError as error:
-        where = table if str(error).startswith("learner.") else ""
-        raise ValueError(f"{where}{error}") from None
 
 
 class LeaderView(Scenario):
@@ -91,8 +78,11 @@ class Leader:
             assert isinstance(options.learner, FittedQSettings)
             view = LeaderView(options)
             context = AgentContext(view, Hierarchy(view.agents, []), np.arange(1), seed)
-            with keys_below("scenario.leader."):
+            try:
                 self.agents = (FuzzyAgents(options.learner, context),)
+            except ValueError as error:  # keys of the learner are those of a table of the scenario
+                where = "scenario.leader." if str(error).startswith("learner.") else ""
+                raise ValueError(f"{where}{error}") from None
         self.enter(scenario, options)
         self.reset()
 

@@ -70,7 +70,7 @@ class MixedSettings(TeamSettings):
             agent = scenario.agents[part_of.index(None)]
             raise ValueError(f"learner.parts: agent {agent!r} belongs to no part")
         known = ", ".join(dict.fromkeys(name for own in names for name in own))
-        kinds = []
+        kinds: list[MembersOf] = []
         for k, part in enumerate(self.parts):
             own = np.flatnonzero([other == k for other in part_of])
             if not len(own):
@@ -78,7 +78,7 @@ class MixedSettings(TeamSettings):
                     f"learner.parts[{k}].agents = {list(part.agents)}: lists no agent that is not "
                     f"in an earlier part, known: {known}"
                 )
-            kinds.append(MembersOf(own, part.learner, part.team))
+            kinds.append((own, part.learner, part.team))
         return kinds
 
     def _part_named(self, agent: str, names: Sequence[str]) -> int | None:

@@ -16,6 +16,7 @@ from ..interface.agents import (
     Counts,
     ReportsResources,
     StateDict,
+    add_prefix,
     select_prefix,
 )
 from ..interface.scenario import Scenario
@@ -81,11 +82,10 @@ def state_of(parts: Sequence[AnyAgents]) -> StateDict:
     """Return the saved state of all parts as named arrays."""
     if len(parts) == 1:
         return parts[0].state_dict()
-    return {
-        f"part{k}.{name}": array
-        for k, part in enumerate(parts)
-        for name, array in part.state_dict().items()
-    }
+    state: StateDict = {}
+    for k, part in enumerate(parts):
+        state |= add_prefix(f"part{k}.", part.state_dict())
+    return state
 
 
 def load_state(parts: Sequence[AnyAgents], state: Mapping[str, AnyArray]) -> None:
@@ -129,27 +129,17 @@ def begin_with(agents: AnyAgents, file: str, part: int) -> None:
         raise ValueError(f"{where}: {error}") from None
     kept = select_prefix(f"part{part}.", kept) or kept
     own = agents.state_dict()
-    learned = _learned(own) & kept.keys()
+    learned = {name: kept[name] for name in own if name in kept and name not in OF_A_RUN}
     if not learned:
         content = ", ".join(sorted(kept)) or "nothing"
         raise ValueError(f"{where}: contains no weights of this learner, but {content}")
-    for name in sorted(learned):
-        _check_shape(where, name, kept[name], own)
+    for name, array in learned.items():  # other arrays grow with experience
+        if name.endswith("theta") and array.shape != own[name].shape:
+            raise ValueError(
+                f"{where}: {name} has shape {array.shape}, these agents need {own[name].shape}; "
+                "with learner.weights = 'role', teams of other sizes can share weights"
+            )
     try:
-        agents.load_state_dict({**own, **{name: kept[name] for name in learned}})
+        agents.load_state_dict(own | learned)
     except (KeyError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
-
-
-def _learned(memory: StateDict) -> set[str]:
-    return {name for name in memory if name not in OF_A_RUN}
-
-
-def _check_shape(where: str, name: str, kept: AnyArray, own: Mapping[str, AnyArray]) -> None:
-    """Refuse weights of another shape; arrays that grow with experience may have any length."""
-    is_weights = name.endswith("theta")
-    if is_weights and kept.shape != own[name].shape:
-        raise ValueError(
-            f"{where}: {name} has shape {kept.shape}, these agents need {own[name].shape}; "
-            "with learner.weights = 'role', teams of other sizes can share weights"
-        )

@@ -6,8 +6,8 @@ A `Peer` observes the same state variables and receives the same rewards as a hi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Annotated, Self
 
 import numpy as np
@@ -88,14 +88,8 @@ class Peer(ABC):
         raise ValueError(warm_start_refusal("learner.kind", self))
 
 
-@dataclass
-class PeerInputs:
-    """Inputs of a joint decision."""
-
-    seen: Observation
-    explore: bool
-    joint_action: IntArray | None = None
-    """``(n,)`` the joint action, once it has been chosen."""
+PeerInputs = Callable[[], IntArray]
+"""Returns the joint action ``(n,)`` of a decision, which is chosen once."""
 
 
 class PeerAgents(Agents[PeerInputs]):
@@ -123,14 +117,11 @@ class PeerAgents(Agents[PeerInputs]):
 
     def observe(self, seen: Observation, *, explore: bool) -> PeerInputs:
         """Return the inputs of a decision."""
-        return PeerInputs(seen, explore)
+        return cache(lambda: np.asarray(self.peer.act(seen, explore=explore)))
 
     def act(self, inputs: PeerInputs, inbox: Inbox) -> IntArray:
         """Return the actions of a stage; the first stage chooses the joint action."""
-        if inputs.joint_action is None:
-            joint_action = self.peer.act(inputs.seen, explore=inputs.explore)
-            inputs.joint_action = np.asarray(joint_action)
-        return inputs.joint_action[inbox.agents]
+        return inputs()[inbox.agents]
 
     def learn(self, experience: Experience, inputs: PeerInputs) -> None:
         """Learn from a step."""

@@ -31,7 +31,7 @@ from ..interface.scenario import Scenario, checked_scenario, prediction_of
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from ..plugins.settings import Settings
 from ..plugins.words import expect
-from .decision_costs import DecisionCosts
+from .decision_costs import join_costs, total_costs
 from .inspection import inspect_agents, record_values, recorded_values
 from .leader import build_leader, enter_scenario
 from .parts import build_parts, counts_of, load_state, state_of, weight_bytes_of
@@ -109,8 +109,7 @@ class Team:
         numbered = dict(enumerate(self.parts))
         self._senders = {k: p for k, p in numbered.items() if isinstance(p, SendsPayloads)}
         self._observing = {k: p for k, p in numbered.items() if isinstance(p, ObservesJointActions)}
-        self._costs = DecisionCosts(self.parts, counts_messages=bool(self._senders))
-        self.costs = self._costs.measures
+        self.costs = join_costs(self.parts, counts_messages=bool(self._senders))
         self.decision_costs: Mapping[str, float] = {}
         self._n_received = 0
         self.messages = Messages(
@@ -229,9 +228,8 @@ class Team:
             Whether the agents explore. If not, each takes an action of greatest value, and the
             team changes only the random numbers that break ties.
         inspect
-            Whether the decision contains the values, received actions and exploration of single
-            agents, see `AgentDecision`. The joint action is the same; agents that would share one
-            search then search one after the other, which takes longer.
+            Whether the decision contains those of single agents, see `AgentDecision`. The joint
+            action is the same, but takes longer if agents would share one search.
 
         Examples
         --------
@@ -265,7 +263,9 @@ class Team:
         for k, observing in self._observing.items():
             observing.conclude(inputs[k], joint_action)
         if self.costs:
-            self.decision_costs = self._costs.total(inputs, joint_action, self._n_received)
+            self.decision_costs = total_costs(
+                self.parts, inputs, joint_action, self.costs, self._n_received
+            )
             self._n_received = 0
         if inboxes is None:
             return Decision(joint_action, inputs)

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
-from ..interface.abilities import Embodiment, PartiallyObserved
+from ..interface.abilities import PartiallyObserved
 from ..interface.agents import AgentContext
-from ..interface.experience import Observation
 from ..interface.measures import Measure
 from ..interface.prediction import Prediction
 from ..learners.learner import LearnerSettings
-from ..models.team_model import TeamModel
 from ..numerics import FloatArray, IntArray
 from ..search.errors import Errors
 from ..search.evaluator import concerned
@@ -37,13 +34,8 @@ actions an agent expected rightly (with plans only; senders count as well), and 
 actions and of received states of other bodies."""
 
 
-class OwnView(NamedTuple):
-    """Prediction and weights by which one agent decides."""
-
-    prediction: Prediction
-    """Prediction of the agent."""
-    weights: list[FloatArray]
-    """Consequent weights of every agent, as the agent knows them."""
+OwnView = tuple[Prediction, list[FloatArray]]
+"""Prediction and consequent weights of every agent, by which one agent decides."""
 
 
 @dataclass
@@ -84,8 +76,6 @@ class Views:
         Row of weights of every agent of the team; None if its weights are unknown.
     n_rules
         Number of rules of the rule base.
-    model
-        Predictor of the agents.
     plans
         Whether the agents plan, so that they expect actions of the others.
 
@@ -94,10 +84,6 @@ class Views:
     costs
         Measures of the agents, see `COSTS`.
 
-    Raises
-    ------
-    ValueError
-        If the settings name errors of constants that the predictor does not have; one line.
     """
 
     def __init__(
@@ -106,14 +92,12 @@ class Views:
         context: AgentContext,
         rows: list[int | None],
         n_rules: int,
-        model: TeamModel,
         *,
         plans: bool,
     ) -> None:
         self.costs = COSTS if plans else COSTS[1:]
         self._members = context.members.tolist()
         self._rows = rows
-        self._model = model
         hierarchy = context.hierarchy
         scenario = context.scenario
         perceived = len(context.members) * (len(scenario.groups) - 1)
@@ -123,29 +107,15 @@ class Views:
         self._broadcast = 0.0 if settings.values_actions else float(perceived)
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
-            n_constants = 0
-            needs_constants = settings.decision.errors.constants and model.predictor is None
-            if needs_constants and isinstance(scenario, Embodiment):
-                n_constants = len(scenario.constants)
             valued = concerned(hierarchy, settings.decision.value_of)
-            self._errors = Errors(
-                settings.decision.errors, valued, rows, n_rules, n_constants, context.seed
-            )
+            self._errors = Errors(settings.decision.errors, valued, rows, n_rules, context.seed)
 
-    def by_agent(
-        self, seen: Observation, shared: Prediction, theta: FloatArray
-    ) -> dict[int, OwnView]:
+    def by_agent(self, shared: Prediction, theta: FloatArray) -> dict[int, OwnView]:
         """Return the view of every agent: prediction and weights, with its own errors."""
         views: dict[int, OwnView] = {}
         for agent in self._members:
-            prediction = shared
-            own = theta
-            if self._errors is not None:
-                own = self._errors.weights(agent, theta)
-                constants = self._errors.constants(agent)
-                if constants is not None:
-                    prediction = self._model.predict(seen, constants)
-            views[agent] = OwnView(prediction.of(agent), weights_by_agent(self._rows, own))
+            own = theta if self._errors is None else self._errors.weights(agent, theta)
+            views[agent] = shared.of(agent), weights_by_agent(self._rows, own)
         return views
 
     def decision_costs(self, agreement: float, hierarchy: Hierarchy) -> Mapping[str, float]:

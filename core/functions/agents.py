@@ -8,8 +8,8 @@ step and the agent, so that topologies are compared with common random numbers.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, field
 from inspect import Parameter, iscoroutinefunction, signature
 from typing import Any, NamedTuple, Self
@@ -95,12 +95,10 @@ class FunctionAgents(Agents[FunctionInputs]):
         self._options = {name: value for name, value in settings if name in own}
         self.rng = np.random.Generator(np.random.PCG64(context.seed))
         self._key = context.seed.generate_state(2, np.uint64)
-        reported = [
-            Measure(name, name, unit, gathering="sum", better="lower", least=0)
-            for name, unit in settings.costs.items()
-        ]
-        counted = [measure for measure in COUNTED if measure.name not in settings.costs]
-        self.costs = (*counted, *reported)
+        measures = {measure.name: measure for measure in COUNTED}
+        for name, unit in settings.costs.items():
+            measures[name] = Measure(name, name, unit, gathering="sum", better="lower", least=0)
+        self.costs = tuple(measures.values())
         self.reset(0, learn=False)
 
     def reset(self, episode: int, *, learn: bool) -> None:
@@ -127,7 +125,10 @@ class FunctionAgents(Agents[FunctionInputs]):
         if "observations" in self._parameters:
             answers = self._call_batch(arguments)
         else:
-            answers = [self._call_one(given) for given in arguments]
+            answers = [
+                self._call(str(own["agent"]), {name: own[name] for name in self._parameters})
+                for own in arguments
+            ]
         for agent, answer in zip(agents, answers, strict=True):
             try:
                 reply = read_reply(answer, self._actions, self.settings.costs)
@@ -152,10 +153,6 @@ class FunctionAgents(Agents[FunctionInputs]):
             "actions": self._actions,
             "step": self._step,
         }
-
-    def _call_one(self, given: Mapping[str, object]) -> object:
-        chosen = {name: given[name] for name in self._parameters}
-        return self._call(str(given["agent"]), chosen)
 
     def _call_batch(self, given: Sequence[Mapping[str, object]]) -> Sequence[object]:
         chosen: dict[str, object] = {}
@@ -183,21 +180,18 @@ class FunctionAgents(Agents[FunctionInputs]):
     ) -> dict[int, dict[str, ReceivedMessage]]:
         """Return the messages of each agent by sender, in agent order, and count their size."""
         received: dict[int, dict[str, ReceivedMessage]] = {a: {} for a in inbox.agents.tolist()}
-        hears_contents = self.settings.hears == "contents" and bool(inbox.payloads)
-        contents = inbox.payloads if hears_contents else (None,) * len(inbox.senders)
-        # A content that a sender tells several agents is one object, measured once.
-        messages: dict[tuple[int, int, int], tuple[ReceivedMessage, int]] = {}
+        contents = inbox.payloads
+        if self.settings.hears == "actions" or not contents:
+            contents = (None,) * len(inbox.senders)
         arrays = (inbox.receivers.tolist(), inbox.senders.tolist(), inbox.actions.tolist())
         for receiver, sender, action, content in zip(*arrays, contents, strict=True):
-            key = sender, action, id(content)
-            if key not in messages:
-                size = 0 if content is None else len(canonical(content).encode())
-                messages[key] = ReceivedMessage(self._actions[action], content), size
-            message, size = messages[key]
-            if isinstance(content, list | dict):  # receivers may modify what they receive
-                message = message._replace(content=deepcopy(content))
-            received[receiver][self._agents[sender]] = message
-            inputs.message_bytes += size
+            if content is not None:  # receivers may modify what they receive
+                text = canonical(content)
+                inputs.message_bytes += len(text.encode())
+                content = json.loads(text)
+            received[receiver][self._agents[sender]] = ReceivedMessage(
+                self._actions[action], content
+            )
         return received
 
     def payloads(self, inputs: FunctionInputs) -> Mapping[int, object]:
@@ -207,11 +201,11 @@ class FunctionAgents(Agents[FunctionInputs]):
 
     def decision_costs(self, inputs: FunctionInputs, joint_action: IntArray) -> Mapping[str, float]:
         """Return the costs of all answers of a decision."""
-        total = {measure.name: 0.0 for measure in self.costs}
-        counts = (len(inputs.replies), inputs.message_bytes)
-        for measure, count in zip(COUNTED, counts, strict=True):
-            if measure.name not in self.settings.costs:
-                total[measure.name] = float(count)
+        counted = {
+            "calls": float(len(inputs.replies)),
+            "message_bytes": float(inputs.message_bytes),
+        }
+        total = counted | dict.fromkeys(self.settings.costs, 0.0)
         for reply in inputs.replies.values():
             for name, value in reply.costs.items():
                 total[name] += value

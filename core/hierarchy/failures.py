@@ -7,7 +7,7 @@ agents assume about actions that they did not receive.
 """
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.random import Generator
@@ -82,21 +82,8 @@ GARBLED = -1
 """Age of a message with an unreadable payload."""
 
 
-class Sent(NamedTuple):
-    """Messages as some agents send them."""
-
-    actions: IntArray
-    """``(k,)`` decided actions."""
-    past: Sequence[IntArray]
-    """Actions ``(k,)`` of these agents in earlier decisions, the most recent last."""
-    n_actions: int
-    """Number of actions of every agent."""
-    rng: Generator
-    """Random stream of the failures."""
-
-
 class MessageFailure(Scheduled):
-    """A failure of the messages of some agents during some time."""
+    """A failure of the messages of some agents during some time; by default none arrives."""
 
     part: ClassVar[str] = "agents"
 
@@ -113,16 +100,26 @@ class MessageFailure(Scheduled):
 
     @property
     def history_length(self) -> int:
-        """Number of earlier decisions that the failure requires."""
+        """Delay of the messages in decisions."""
         return 0
 
-    def passed(self, sent: Sent) -> IntArray:
-        """Return the actions that arrive ``(k,)``, with `LOST` for lost messages."""
-        return sent.actions
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> IntArray:
+        """Return the actions that arrive ``(k,)``, with `LOST` for lost messages.
 
-    def ages(self, sent: Sent, arrived: IntArray, ages: IntArray) -> IntArray:
-        """Return the age of every message in decisions ``(k,)``, or `GARBLED`."""
-        return np.where(arrived == sent.actions, ages, GARBLED)
+        Parameters
+        ----------
+        actions
+            ``(k,)`` decided actions.
+        past
+            Actions ``(k,)`` of these agents in earlier decisions, the most recent last.
+        n_actions
+            Number of actions of every agent.
+        rng
+            Random stream of the failures.
+        """
+        return np.full_like(actions, LOST)
 
 
 class LostMessages(MessageFailure):
@@ -132,10 +129,11 @@ class LostMessages(MessageFailure):
     probability: Fraction = 1.0
     """Probability that a message is lost. At 1 the agents are silent."""
 
-    def passed(self, sent: Sent) -> IntArray:
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> IntArray:
         """Return the actions, some of them lost."""
-        arrives = sent.rng.random(len(sent.actions)) >= self.probability
-        return np.where(arrives, sent.actions, LOST)
+        return np.where(rng.random(len(actions)) >= self.probability, actions, LOST)
 
 
 class DelayedMessages(MessageFailure):
@@ -150,14 +148,12 @@ class DelayedMessages(MessageFailure):
         """The delay."""
         return self.decisions
 
-    def passed(self, sent: Sent) -> IntArray:
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> IntArray:
         """Return the actions of an earlier decision."""
-        is_early = len(sent.past) < self.decisions
-        return np.full_like(sent.actions, LOST) if is_early else sent.past[-self.decisions]
-
-    def ages(self, sent: Sent, arrived: IntArray, ages: IntArray) -> IntArray:
-        """Return the ages plus the delay."""
-        return ages + self.decisions
+        is_early = len(past) < self.decisions
+        return np.full_like(actions, LOST) if is_early else past[-self.decisions]
 
 
 class NoisyMessages(MessageFailure):
@@ -167,21 +163,19 @@ class NoisyMessages(MessageFailure):
     probability: Fraction = 0.3
     """Probability that a message is replaced."""
 
-    def passed(self, sent: Sent) -> IntArray:
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> IntArray:
         """Return the actions, some of them replaced by random ones."""
-        k = len(sent.actions)
-        noise = sent.rng.integers(sent.n_actions, size=k, dtype=np.int64)
-        return np.where(sent.rng.random(k) < self.probability, noise, sent.actions)
+        k = len(actions)
+        noise = rng.integers(n_actions, size=k, dtype=np.int64)
+        return np.where(rng.random(k) < self.probability, noise, actions)
 
 
 class AbsentAgents(MessageFailure):
     """The agents perform the neutral action and send no messages; the others do not know."""
 
     kind: Literal["absent"] = "absent"
-
-    def passed(self, sent: Sent) -> IntArray:
-        """Return that all messages are lost."""
-        return np.full_like(sent.actions, LOST)
 
 
 class LeftAgents(MessageFailure):
@@ -198,10 +192,6 @@ class LeftAgents(MessageFailure):
     no agent (``none``)."""
     action: str | None = None
     """Action of the agents meanwhile; by default the neutral one."""
-
-    def passed(self, sent: Sent) -> IntArray:
-        """Return that all messages are lost."""
-        return np.full_like(sent.actions, LOST)
 
 
 AnyMessageFailure = Annotated[

@@ -22,7 +22,8 @@ learners; sparse ones are coordination graphs.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator
@@ -214,18 +215,14 @@ class Hierarchy:
         self, agent: int, relation: str | tuple[str, ...], everyone: str
     ) -> tuple[int, ...]:
         """Return the agents in a relation to `agent`; `everyone` are those without restriction."""
-        related: Iterable[int]
-        match relation if isinstance(relation, str) else everyone:
-            case "ancestors":
-                related = nx.ancestors(self._graph, agent)
-            case "parents":
-                related = self._graph.predecessors(agent)
-            case "descendants":
-                related = nx.descendants(self._graph, agent)
-            case "children":
-                related = self._graph.successors(agent)
-            case _:
-                related = ()
+        finders: Mapping[str, Callable[[int], Iterable[int]]] = {
+            "ancestors": partial(nx.ancestors, self._graph),
+            "parents": self._graph.predecessors,
+            "descendants": partial(nx.descendants, self._graph),
+            "children": self._graph.successors,
+            "none": lambda _: (),
+        }
+        related = finders[relation if isinstance(relation, str) else everyone](agent)
         if not isinstance(relation, str):
             own = self._body_of[agent]
             distances = {i: min(abs(self._body_of[i] - own), 2) for i in related}

@@ -1,7 +1,6 @@
 """Delivery of messages: the inbox of every stage, given message failures and absent agents."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from .failures import (
     AbsentAgents,
     LeftAgents,
     MessageFailure,
-    Sent,
 )
 from .hierarchy import Hierarchy
 from .repair import without
@@ -24,15 +22,9 @@ Payloads = Mapping[int, object]
 NO_PAYLOADS: Payloads = {}
 
 
-class Received(NamedTuple):
-    """Messages that one agent receives."""
-
-    senders: IntArray
-    """``(k,)`` senders."""
-    actions: IntArray
-    """``(k,)`` their decided actions, as received."""
-    ages: IntArray
-    """``(k,)`` number of decisions since a message was sent, or `GARBLED`."""
+Received = tuple[IntArray, IntArray, IntArray]
+"""Messages that one agent receives: senders ``(k,)``, their actions ``(k,)`` as received, and the
+numbers ``(k,)`` of decisions since they were sent, or `GARBLED`."""
 
 
 class Messages:
@@ -70,8 +62,8 @@ class Messages:
     >>> chain = Hierarchy("abc", [("a", "b"), ("b", "c")])
     >>> messages = Messages(chain, [LostMessages(agents="a")], n_actions=4)
     >>> messages.reset(0, episode=0)
-    >>> received = messages.received(2, np.array([3, 1, 0]))
-    >>> received.senders.tolist(), received.actions.tolist()
+    >>> senders, actions, _ = messages.received(2, np.array([3, 1, 0]))
+    >>> senders.tolist(), actions.tolist()
     ([1], [1])
     """
 
@@ -137,12 +129,12 @@ class Messages:
                 mailboxes.append((agent, self.received_from_neighbors(agent)))
         empty = np.zeros(0, dtype=np.int64)
         received = [mailbox for _, mailbox in mailboxes]
-        counts = [len(mailbox.senders) for mailbox in received]
+        counts = [len(senders) for senders, _, _ in received]
         return Inbox(
             agents,
             np.repeat(np.array([agent for agent, _ in mailboxes], dtype=np.int64), counts),
-            np.concatenate([empty, *(mailbox.senders for mailbox in received)]),
-            np.concatenate([empty, *(mailbox.actions for mailbox in received)]),
+            np.concatenate([empty, *(senders for senders, _, _ in received)]),
+            np.concatenate([empty, *(actions for _, actions, _ in received)]),
             () if payloads is None else self._payloads_of(received, payloads),
         )
 
@@ -154,7 +146,7 @@ class Messages:
         """Return the messages that neighbors sent in the previous decision."""
         senders = np.array(sorted(self._neighbors[agent]), dtype=np.int64)
         if not self._past_actions:
-            return Received(senders[:0], senders[:0], senders[:0])
+            return senders[:0], senders[:0], senders[:0]
         return self._transmit(senders, self._past_actions, 1)
 
     def absent(self, agents: IntArray) -> IntArray:
@@ -184,10 +176,10 @@ class Messages:
     def _activate_failures(self) -> None:
         now = self._episode, self._step
         self._active = [k for k, failure in enumerate(self.failures) if failure.lasts(*now)]
-        departures = [k for k in self._active if isinstance(self.failures[k], LeftAgents)]
-        if tuple(departures) != self._departures:
-            self._departures = tuple(departures)
-            self._repair_hierarchy(self._departures)
+        departures = tuple(k for k in self._active if isinstance(self.failures[k], LeftAgents))
+        if departures != self._departures:
+            self._departures = departures
+            self._repair_hierarchy(departures)
 
     def _repair_hierarchy(self, departures: tuple[int, ...]) -> None:
         """Remove the agents that failures of kind `LeftAgents` name, one after the other."""
@@ -214,21 +206,23 @@ class Messages:
         for k in self._active:
             affected = np.flatnonzero(self._masks[k][senders])
             past = [joint_action[senders[affected]] for joint_action in history[:-1]]
-            sent = Sent(actions[affected], past, self._n_actions, self._rng)
-            arrived = self.failures[k].passed(sent)
-            ages[affected] = self.failures[k].ages(sent, arrived, ages[affected])
+            sent = actions[affected]
+            arrived = self.failures[k].passed(sent, past, self._n_actions, self._rng)
+            delay = self.failures[k].history_length
+            is_garbled = (delay == 0) & (arrived != sent)
+            ages[affected] = np.where(is_garbled, GARBLED, ages[affected] + delay)
             actions[affected] = arrived
             is_received = actions != LOST
             senders = senders[is_received]
             actions = actions[is_received]
             ages = ages[is_received]
-        return Received(senders, actions, ages)
+        return senders, actions, ages
 
     def _payloads_of(self, received: Sequence[Received], payloads: Payloads) -> tuple[object, ...]:
         """Return the payload of every received message."""
         by_age = [payloads, *reversed(self._past_payloads)]
         return tuple(
             None if age == GARBLED else by_age[age].get(sender)
-            for mailbox in received
-            for sender, age in zip(mailbox.senders.tolist(), mailbox.ages.tolist(), strict=True)
+            for senders, _, ages in received
+            for sender, age in zip(senders.tolist(), ages.tolist(), strict=True)
         )

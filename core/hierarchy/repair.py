@@ -36,7 +36,7 @@ def without(hierarchy: Hierarchy, gone: Sequence[int], repair: Repair) -> Hierar
     for agent in sorted(gone, key=rank.__getitem__):
         above = list(graph.predecessors(agent))
         below = sorted(graph.successors(agent), key=rank.__getitem__)
-        graph.remove_edges_from([*graph.in_edges(agent), *graph.out_edges(agent)])
+        graph.remove_node(agent)
         heirs = below[:1] if repair == "next" else below
         if repair != "none":
             graph.add_edges_from((superior, heir) for superior in above for heir in heirs)

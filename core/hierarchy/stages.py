@@ -71,11 +71,10 @@ def decision_stages(
     else:
         groups = []
         for agent in hierarchy.order:
-            part = part_of[agent]
             previous = groups[-1] if groups else []
-            is_same_part = bool(previous) and part_of[previous[0]] == part
+            is_same_part = {part_of[i] for i in previous} == {part_of[agent]}
             is_independent = not set(previous) & set(hierarchy.senders(agent))
-            if acts_in_parallel[part] and is_same_part and is_independent:
+            if acts_in_parallel[part_of[agent]] and is_same_part and is_independent:
                 previous.append(agent)
             else:
                 groups.append([agent])

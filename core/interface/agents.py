@@ -39,6 +39,11 @@ def select_prefix(prefix: str, state: Mapping[str, AnyArray]) -> StateDict:
     return {name.removeprefix(prefix): state[name] for name in state if name.startswith(prefix)}
 
 
+def add_prefix(prefix: str, state: Mapping[str, AnyArray]) -> StateDict:
+    """Return arrays with a prefix before their names, see `select_prefix`."""
+    return {f"{prefix}{name}": array for name, array in state.items()}
+
+
 @dataclass(frozen=True)
 class AgentContext:
     """Scenario, hierarchy and random seed for which agents are built."""
@@ -73,9 +78,8 @@ class Counts:
 
     def add(self, other: Counts) -> None:
         """Add the counts of other agents."""
-        self.joint_actions += other.joint_actions
-        self.rule_evaluations += other.rule_evaluations
-        self.weight_updates += other.weight_updates
+        for name, count in vars(other).items():
+            vars(self)[name] += count
 
 
 class Agents(ABC, Generic[I]):

@@ -12,7 +12,7 @@ from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,26 +21,7 @@ from .measures import Measure
 from .prediction import UNPREDICTED, Prediction
 from .spaces import ActionSet, StateSpace
 
-Twists = FloatArray | Callable[[], FloatArray | None] | None
-"""Twists of a transition, a function that measures them, or None."""
-
-
-class DeferredTwists:
-    """Twists of a transition, measured on first access if a function was given."""
-
-    def __get__(self, transition: Transition | None, owner: type[Transition]) -> FloatArray | None:
-        """Return the twists; None is the default."""
-        if transition is None:
-            return None
-        twists: Twists = vars(transition)["twists"]
-        if callable(twists):
-            twists = twists()
-            vars(transition)["twists"] = twists
-        return twists
-
-    def __set__(self, transition: Transition, twists: Twists) -> None:
-        """Store the twists, or the function that measures them."""
-        vars(transition)["twists"] = twists
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -57,13 +38,17 @@ class Transition:
     """Whether the episode ends for lack of time."""
     info: Mapping[str, Any]
     """Measurements by name, scalars or small arrays. They are recorded; learners ignore them."""
-    twists: DeferredTwists = DeferredTwists()
-    """``(M, 3)`` mean twist of every body in its own frame [m/s, m/s, rad/s], if it is measured.
-    ``(K + M, 3)`` if the twists of K moved objects are measured, too. These come first, and only
-    the bodies may have moved the objects. A given function is called on first access."""
+    twists: FloatArray | Callable[[], FloatArray | None] | None = None
+    """``(M, 3)`` mean twist of every body in its own frame [m/s, m/s, rad/s], or a function that
+    measures them; None without bodies. ``(K + M, 3)`` if the twists of K moved objects are
+    measured, too. These come first, and only the bodies may have moved the objects."""
     absorbing: bool = True
     """Whether a terminal state is repeated forever, with its reward, like a box at its goal. If
     not, its reward is received once, as in Gymnasium."""
+
+    def measured_twists(self) -> FloatArray | None:
+        """Return the twists, which a function may have to measure."""
+        return self.twists() if callable(self.twists) else self.twists
 
 
 def checked_transition(transition: object, space: StateSpace, agents: Sequence[str]) -> Transition:
@@ -77,19 +62,18 @@ def checked_transition(transition: object, space: StateSpace, agents: Sequence[s
     if not isinstance(transition, Transition):
         given = type(transition).__name__
         raise ValueError(f"step returns {given}, allowed: nested_agents.Transition")
-    twists: Twists = vars(transition)["twists"]
     return Transition(
         states=space.checked(transition.states, agents),
         reward=checked_reward(transition.reward, agents),
         terminated=bool(transition.terminated),
         truncated=bool(transition.truncated),
         info={name: _copied(value) for name, value in transition.info.items()},
-        twists=_copied(twists),  # type: ignore[arg-type]  # given, or a function that returns them
+        twists=_copied(transition.twists),
         absorbing=bool(transition.absorbing),
     )
 
 
-def _copied(value: object) -> object:
+def _copied(value: T) -> T:
     """Return a copy of a mutable value."""
     return deepcopy(value) if isinstance(value, np.ndarray | list | dict) else value
 
@@ -265,22 +249,10 @@ def has_same_agents(scenario: Scenario, other: Scenario) -> bool:
     )
 
 
-class Members(NamedTuple):
-    """Some agents of a scenario."""
-
-    scenario: Scenario
-    members: IntArray
-    """``(k,)`` indices of the agents, in agent order."""
-
-    def owners(self, *, shared: bool) -> list[str]:
-        """Return the owner of every row of weights: agents, or roles if weights are shared."""
-        names = self.scenario.roles if shared else tuple(self.scenario.agents)
-        return list(dict.fromkeys(names[i] for i in self.members))
-
-    @property
-    def text(self) -> str:
-        """Number of agents and name of their state space."""
-        return f"{len(self.members)} agents over {self.scenario.state_space.name!r}"
+def owners_of(scenario: Scenario, members: IntArray, *, shared: bool) -> list[str]:
+    """Return the owner of each agent's weights: the agent, or its role if weights are shared."""
+    names = scenario.roles if shared else tuple(scenario.agents)
+    return [names[i] for i in members]
 
 
 def rows_of(scenario: Scenario, members: IntArray, *, shared: bool) -> IntArray:
@@ -295,25 +267,53 @@ def rows_of(scenario: Scenario, members: IntArray, *, shared: bool) -> IntArray:
     >>> rows_of(three, np.arange(1, 3), shared=False).tolist()
     [0, 1]
     """
-    owners = Members(scenario, members).owners(shared=shared)
-    names = scenario.roles if shared else tuple(scenario.agents)
-    return np.array([owners.index(names[i]) for i in members])
+    owners = owners_of(scenario, members, shared=shared)
+    rows = list(dict.fromkeys(owners))
+    return np.array([rows.index(owner) for owner in owners])
 
 
-def carried_rows(former: Members, successor: Members, *, shared: bool) -> IntArray:
+def check_transfer(former: Scenario, successor: Scenario, problem: str = "") -> None:
+    """Refuse agents of one scenario in another one that has other states or actions.
+
+    Raises
+    ------
+    ValueError
+        If state spaces or actions differ, or there is another `problem`; one line.
+    """
+    if former.state_space != successor.state_space:
+        problem = "the state spaces differ"
+    elif former.action_set != successor.action_set:
+        problem = "the actions differ"
+    if problem:
+        there, here = (
+            f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (former, successor)
+        )
+        raise ValueError(f"a team trained with {there} cannot act with {here}: {problem}")
+
+
+def carried_rows(
+    former: Scenario,
+    successor: Scenario,
+    owners: Sequence[str],
+    others: Sequence[str],
+    *,
+    shared: bool,
+) -> IntArray:
     """Return the former row of weights from which each row of other agents starts.
 
     Parameters
     ----------
     former, successor
-        Trained agents, and the agents that start from their weights.
+        Scenario of trained agents, and that of the agents that start from their weights.
+    owners, others
+        Owner of the weights of each trained agent, and of each other agent, see `owners_of`.
     shared
         Whether roles share weights. If not, the agents must be the same.
 
     Returns
     -------
     IntArray
-        ``(n_rows,)`` indices of rows of `former`.
+        ``(n_rows,)`` indices of rows of the trained agents.
 
     Raises
     ------
@@ -324,20 +324,14 @@ def carried_rows(former: Members, successor: Members, *, shared: bool) -> IntArr
     --------
     >>> from nested_agents.scenarios.line_up import LineUpSettings
     >>> one, three = (LineUpSettings(carts=carts).build() for carts in (1, 3))
-    >>> carried_rows(Members(one, np.arange(1)), Members(three, np.arange(3)), shared=True).tolist()
+    >>> carried_rows(one, three, one.roles, three.roles, shared=True).tolist()
     [0]
     """
-    problem = f"a team trained with {former.text} cannot act with {successor.text}"
-    if former.scenario.state_space != successor.scenario.state_space:
-        raise ValueError(f"{problem}: the state spaces differ")
-    if former.scenario.action_set != successor.scenario.action_set:
-        raise ValueError(f"{problem}: the actions differ")
-    owners = former.owners(shared=shared)
-    others = successor.owners(shared=shared)
-    if set(owners) != set(others):
-        raise ValueError(
-            f"{problem}: their roles are {', '.join(owners)}, and {', '.join(others)}"
-            if shared
-            else f"{problem}: learner.weights = 'own'; with 'role', agents of a role share theirs"
-        )
-    return np.array([owners.index(owner) for owner in others])
+    rows = list(dict.fromkeys(owners))
+    problem = ""
+    if {*rows} != {*others} and shared:
+        problem = f"their roles are {', '.join(rows)}, and {', '.join(dict.fromkeys(others))}"
+    elif {*rows} != {*others}:
+        problem = "learner.weights = 'own'; with 'role', agents of a role share theirs"
+    check_transfer(former, successor, problem)
+    return np.array([rows.index(owner) for owner in dict.fromkeys(others)])

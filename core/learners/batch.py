@@ -10,12 +10,12 @@ diverge. Agents that share weights share the regression and pool their experienc
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
-from ..numerics import FloatArray, IntArray, njit
+from ..numerics import AnyArray, FloatArray, IntArray, njit
 from ..plugins.settings import Fraction, Positive
 from ..values.rule_base import RuleBase
 from .learner import Learner, LearnerSettings
@@ -64,17 +64,6 @@ def solver(gram: FloatArray) -> Function:
     return lambda moment: dpotrs(factor, moment, lower)[0]
 
 
-class Outcomes(NamedTuple):
-    """Rewards and successors of the N after-states of a weight row."""
-
-    rewards: FloatArray
-    """``(N,)`` rewards."""
-    follower: IntArray
-    """``(N,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
-    durations: IntArray
-    """``(N,)`` number of decision periods between an after-state and the next."""
-
-
 class BatchTD(Learner):
     """Batch TD(lambda): a memory of after-states, and regressions on all of them.
 
@@ -94,16 +83,19 @@ class BatchTD(Learner):
         self.rules = rules
         self.rows = rows
         n_rows = int(rows.max()) + 1
-        self.theta: FloatArray = np.zeros((n_rows, rules.n_rules), rules.dtype)
+        self.theta: FloatArray = np.zeros((n_rows, rules.n_rules))
         self._counts = np.bincount(rows).tolist()
         """Number of agents of every row."""
-        # All after-states so far, step by step, in agent order: row, state, reward, index of the
-        # next after-state, and duration of each.
-        self._rows: list[IntArray] = [np.zeros(0, dtype=np.int64)]
-        self._states: list[FloatArray] = [np.zeros((0, len(rules.partitions)))]
-        self._rewards: list[FloatArray] = [np.zeros(0)]
-        self._follower: list[IntArray] = [np.zeros(0, dtype=np.int64)]
-        self._durations: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+        empty = np.zeros(0, dtype=np.int64)
+        self._experience: dict[str, list[AnyArray]] = {
+            "rows": [empty],
+            "states": [np.zeros((0, len(rules.partitions)))],
+            "rewards": [np.zeros(0)],
+            "follower": [empty],
+            "durations": [empty],
+        }
+        """All after-states so far, step by step, in agent order: row, state, reward, index of the
+        next after-state, and duration of each."""
         self._n_states = 0
         self._episode_start = 0  # index of the first after-state of the episode
         # By row, active rules and strengths of the after-states in the last regression, which
@@ -129,11 +121,15 @@ class BatchTD(Learner):
         n = len(states)
         self._n_states += n
         follower = np.full(n, TERMINAL) if terminated else self._n_states + np.arange(n)
-        self._rows.append(self.rows)
-        self._states.append(states.copy())
-        self._rewards.append(np.broadcast_to(np.asarray(reward, dtype=float), (n,)).copy())
-        self._follower.append(follower)
-        self._durations.append(np.full(n, duration))
+        step = {
+            "rows": self.rows,
+            "states": states.copy(),
+            "rewards": np.broadcast_to(np.asarray(reward, dtype=float), (n,)).copy(),
+            "follower": follower,
+            "durations": np.full(n, duration),
+        }
+        for name, array in step.items():
+            self._experience[name].append(array)
         lasted = (self._n_states - self._episode_start) // n
         return 0 if terminated or lasted % self.settings.interval else self._regress()
 
@@ -145,24 +141,29 @@ class BatchTD(Learner):
     @property
     def _is_running(self) -> bool:
         """Whether the last after-state has no successor yet."""
-        return bool((self._follower[-1] >= self._n_states).any())
+        return bool((self._experience["follower"][-1] >= self._n_states).any())
 
     def _cut_off(self) -> None:
         if self._is_running:
-            self._follower[-1][-len(self.rows) :] = CUT_OFF
+            self._experience["follower"][-1][-len(self.rows) :] = CUT_OFF
+
+    def _all(self, name: str, first: int = 0) -> AnyArray:
+        """Return one array of all after-states, from a step on."""
+        return np.concatenate(self._experience[name][first:])
 
     def _regress(self) -> int:
         """Update all weights; return their number."""
         self._extend()
         s = self.settings
-        for row, (outcomes, active) in enumerate(zip(self._outcomes(), self._active, strict=True)):
-            taken, strengths = active
-            follower = outcomes.follower
-            rewards = REWARD_SCALE * outcomes.rewards
+        rewards_of_all, follower_of_all, places = self._outcomes()
+        durations = self._all("durations")
+        for row, (own, (taken, strengths)) in enumerate(zip(places, self._active, strict=True)):
+            follower = follower_of_all[own]
+            rewards = REWARD_SCALE * rewards_of_all[own]
             weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
-            paid = rewards, follower, s.discount**outcomes.durations, weights
+            paid = rewards, follower, s.discount ** durations[own], weights
             constants = s.discount, s.trace_decay, low, high
             for _ in range(s.regression_iterations):
                 theta = solve(aim(values_of(theta), paid, constants, taken, strengths, theta.size))
@@ -191,10 +192,11 @@ class BatchTD(Learner):
 
     def _extend(self) -> None:
         """Find the active rules of after-states that are new since the last regression."""
-        if self._n_regressed == len(self._states):
+        n_steps = len(self._experience["states"])
+        if self._n_regressed == n_steps:
             return
-        states = np.concatenate(self._states[self._n_regressed :])
-        places = self._places(np.concatenate(self._rows[self._n_regressed :]))
+        states = self._all("states", self._n_regressed)
+        places = self._places(self._all("rows", self._n_regressed))
         active = [self._active_of(states[own]) for own in places]
         if self._active:
             active = [
@@ -202,7 +204,7 @@ class BatchTD(Learner):
                 for old, new in zip(self._active, active, strict=True)
             ]
         self._active = active
-        self._n_regressed = len(self._states)
+        self._n_regressed = n_steps
 
     def _places(self, rows: IntArray) -> list[IntArray]:
         """Return the indices of every row among the rows of after-states."""
@@ -212,58 +214,46 @@ class BatchTD(Learner):
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         return self.rules.active(states)
 
-    def _outcomes(self) -> list[Outcomes]:
-        """Return the outcomes of all after-states by row."""
-        rewards = np.concatenate(self._rewards)
-        durations = np.concatenate(self._durations)
-        follower = np.concatenate(self._follower)
+    def _outcomes(self) -> tuple[FloatArray, IntArray, list[IntArray]]:
+        """Return rewards and next after-states of all, and the indices of each row among them.
+
+        Next after-states are counted within their row.
+        """
+        follower = self._all("follower")
         follower[follower >= self._n_states] = CUT_OFF  # the episode continues
+        places = self._places(self._all("rows"))
         place = np.empty(self._n_states, dtype=np.int64)
-        outcomes = []
-        for own in self._places(np.concatenate(self._rows)):
+        for own in places:
             place[own] = np.arange(len(own))
-            after = follower[own]
-            after = np.where(after < 0, after, place[after])
-            outcomes.append(Outcomes(rewards[own], after, durations[own]))
-        return outcomes
+        follower = np.where(follower < 0, follower, place[follower])
+        return self._all("rewards"), follower, places
 
     def states_of(self, row: int) -> FloatArray:
         """Return the after-states ``(m, d)`` of a row."""
-        return np.concatenate(self._states)[np.concatenate(self._rows) == row]
+        return self._all("states")[self._all("rows") == row]
 
     def state_dict(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
-        return {
-            "theta": self.theta,
-            "rows": np.concatenate(self._rows),
-            "states": np.concatenate(self._states),
-            "rewards": np.concatenate(self._rewards),
-            "follower": np.concatenate(self._follower),
-            "durations": np.concatenate(self._durations),
-        }
+        return {"theta": self.theta} | {name: self._all(name) for name in self._experience}
 
     def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
         """Continue from a `state_dict`."""
         self.theta = state["theta"].copy()
-        self._rows = [state["rows"].astype(np.int64)]
-        self._states = [state["states"].copy()]
-        self._rewards = [state["rewards"].astype(float)]
-        self._follower = [state["follower"].astype(np.int64)]
-        self._durations = [state["durations"].astype(np.int64)]
+        for name, steps in self._experience.items():
+            self._experience[name] = [np.array(state[name], steps[0].dtype)]
         self._n_states = len(state["states"])
-        self._episode_start = 1 + int(np.append(-1, np.flatnonzero(self._follower[0] < 0)).max())
+        self._episode_start = 1 + int(np.append(-1, np.flatnonzero(state["follower"] < 0)).max())
         self._active = []
         self._n_regressed = 0
         self._summed = {}
 
     def warm_start(self, former: Self, rows: IntArray) -> None:
         """Start from weights and experience of another team, between its episodes."""
-        state = former.state_dict()
         renamed = np.empty_like(rows)
         renamed[rows] = np.arange(len(rows))
-        BatchTD.load_state_dict(self, state)
+        BatchTD.load_state_dict(self, former.state_dict())
         self.theta = former.theta[rows]
-        self._rows = [renamed[self._rows[0]]]
+        self._experience["rows"] = [renamed[self._all("rows")]]
 
 
 @njit(cache=True)

@@ -36,9 +36,6 @@ from ..values.rule_base import RuleBase
 from .batch import BatchTD, Function, add_gram, row_values, solver
 from .learner import LearnerSettings
 
-NOBODY = "nobody"
-"""Message of a missing sender."""
-
 
 class FittedQSettings(LearnerSettings):
     """Fitted Q iteration: action values without a predictor."""
@@ -81,7 +78,7 @@ class FittedQSettings(LearnerSettings):
                 "learner.mirrored = true: messages have no mirror image; set "
                 "topology.communication = 'none'"
             )
-        told = [choice(f"told{k + 1}", (*actions.names, NOBODY)) for k in range(n_told)]
+        told = [choice(f"told{k + 1}", (*actions.names, "missing")) for k in range(n_told)]
         names = tuple(variable.name for variable in told)
         known = StateSpace(
             space.name, (*space.variables, *told), space.n_own, actions=(*space.actions, *names)
@@ -90,21 +87,15 @@ class FittedQSettings(LearnerSettings):
         action = choice("action", actions.names)
         own = Partition.of(action, self.rule_base.membership, None, self.rule_base.steepness)
         terms = [(*term, len(base.partitions)) for term in base.terms]
-        rules = RuleBase((*base.partitions, own), terms, dtype=self.rule_base.precision)
+        rules = RuleBase((*base.partitions, own), terms)
         return StateSpace(space.name, (*known.variables, action)), rules
 
     def _check_decision(self) -> None:
         """Refuse decision settings that need a predictor."""
-        decision = self.decision
-        allowed = DecisionSettings(rule=decision.rule, unseen=decision.unseen)
-        refused = {
-            "teammates": (decision.teammates, decision.teammates == allowed.teammates),
-            "value_of": (decision.value_of, decision.value_of == allowed.value_of),
-            "plan": (decision.plan, decision.plan == allowed.plan),
-            "evaluator": (decision.evaluator.kind, decision.evaluator == allowed.evaluator),
-        }
-        for key, (value, is_allowed) in refused.items():
-            if not is_allowed:
+        given, usual = dict(self.decision), dict(DecisionSettings())
+        for key in ("teammates", "value_of", "plan", "evaluator"):
+            if given[key] != usual[key]:
+                value = self.decision.evaluator.kind if key == "evaluator" else given[key]
                 raise ValueError(
                     f"learner.decision.{key} = {value!r}: fitted-q predicts nothing and decides by "
                     "its own value; leave it out, or set preset = 'fitted-q'"
@@ -185,12 +176,13 @@ class FittedQ(BatchTD, Evaluator):
         Old sums are reduced by `forgetting`, then new decisions are added. The last decision of a
         running episode is added later, because its outcome is unknown.
         """
-        begin, end = len(self._weights[row]), len(known) - self._is_running * self._counts[row]
-        kept, new = 1.0 - self.settings.forgetting, slice(begin, end)
-        taken, strengths = self._active[row][0][new], self._active[row][1][new]
+        end = len(known) - self._is_running * self._counts[row]
+        new = slice(len(self._weights[row]), end)
+        kept = 1.0 - self.settings.forgetting
+        taken, strengths = self._active[row]
         self._gram[row] *= kept
         self._weights[row] = np.append(kept * self._weights[row], known[new])
-        self._add(row, taken, strengths, known[new])
+        self._add(row, taken[new], strengths[new], known[new])
         return self._gram[row], np.append(self._weights[row], np.zeros(len(known) - end))
 
     def _add(self, row: int, taken: IntArray, strengths: FloatArray, weights: FloatArray) -> None:
@@ -219,7 +211,7 @@ class FittedQ(BatchTD, Evaluator):
         Raises
         ------
         ValueError
-            If the former values are not a sum of these rules.
+            If it differs and rules have several variables.
         """
         super().warm_start(former, rows)
         self._weights = [former._weights[row].copy() for row in rows]
@@ -227,7 +219,7 @@ class FittedQ(BatchTD, Evaluator):
             self._gram = former._gram[rows]
             return
         self.theta = carried_weights(former.rules, self.rules, self.theta)
-        self._states = [self._with_told(states) for states in self._states]
+        self._experience["states"] = [self._with_told(self._all("states"))]
         for row, weights in enumerate(self._weights):
             taken, strengths = self._active_of(self.states_of(row)[: len(weights)])
             self._add(row, taken, strengths, weights)
@@ -249,28 +241,17 @@ def carried_weights(former: RuleBase, rules: RuleBase, theta: FloatArray) -> Flo
     Raises
     ------
     ValueError
-        If a remaining product of variables is not a term of the new rule base.
+        If rules have several variables besides the own action.
     """
-    shared = min(len(former.partitions), len(rules.partitions)) - 1
-    own = len(rules.partitions) - 1
+    if max(len(term) for base in (former, rules) for term in base.terms) > 2:
+        raise ValueError(
+            "learner.rule_base.order: agents receive another number of messages than when they "
+            "learned, which needs order = 1"
+        )
     blocks = np.split(theta, np.cumsum(former.sizes)[:-1], axis=1)
-    shapes = [[rules.partitions[j].size for j in term] for term in rules.terms]
-    carried = [np.zeros((len(theta), *shape), theta.dtype) for shape in shapes]
-    for term, block in zip(former.terms, blocks, strict=True):
-        *known, _ = term
-        tensor = block.reshape(len(theta), *(former.partitions[j].size for j in term))
-        tensor = tensor[(..., *(slice(None) if j < shared else -1 for j in known), slice(None))]
-        kept = [j for j in known if j < shared] + [own]
-        into = [k for k, other in enumerate(rules.terms) if set(kept) <= set(other)]
-        if not into:
-            raise ValueError(
-                "learner.rule_base: an agent receives fewer messages than when it learned, and "
-                "has no rules over the remaining variables of its products"
-            )
-        place = next((k for k in into if len(rules.terms[k]) == len(kept)), into[0])
-        wide = [
-            size if j in kept else 1
-            for j, size in zip(rules.terms[place], shapes[place], strict=True)
-        ]
-        carried[place] += tensor.reshape(len(theta), *wide)
-    return np.concatenate([block.reshape(len(theta), -1) for block in carried], axis=1)
+    kept = blocks[: len(rules.sizes)]
+    n_actions = rules.partitions[-1].size
+    for block in blocks[len(kept) :]:  # the last membership function is that of a missing sender
+        kept[0] = kept[0] + np.tile(block[:, -n_actions:], rules.sizes[0] // n_actions)
+    new = [np.zeros((len(theta), size)) for size in rules.sizes[len(kept) :]]
+    return np.concatenate([*kept, *new], axis=1)

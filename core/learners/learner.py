@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC
 from collections.abc import Mapping
 from pkgutil import resolve_name
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -41,8 +41,6 @@ class Learner(ABC):
     every agent.
     """
 
-    fixed_arrays: ClassVar[tuple[str, ...]] = ("theta",)
-    """Names of saved arrays with shapes that the settings determine."""
     theta: FloatArray
     """``(n_rows, n_rules)`` consequent weights."""
 
@@ -123,15 +121,9 @@ class Learner(ABC):
         raise ValueError(warm_start_refusal("learner.kind", self))
 
 
-class MembersOf(NamedTuple):
-    """Agents of one kind in a team."""
-
-    members: IntArray
-    """``(k,)`` indices of the agents, in agent order."""
-    settings: TeamSettings
-    """Settings of these agents."""
-    team: str | None = None
-    """File of the team that provides their initial weights, or None."""
+MembersOf = tuple[IntArray, "TeamSettings", str | None]
+"""Indices ``(k,)`` of agents of one kind, their settings, and the file of the team that provides
+their initial weights, or None."""
 
 
 class TeamSettings(PartSettings):
@@ -167,7 +159,7 @@ class TeamSettings(PartSettings):
         ValueError
             If an agent has no settings.
         """
-        return [MembersOf(np.arange(len(hierarchy)), self)]
+        return [(np.arange(len(hierarchy)), self, None)]
 
     @property
     def n_environments(self) -> int:

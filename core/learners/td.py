@@ -8,11 +8,6 @@ distinguishes an action that pays well in coordination from a lucky one (Kapetan
 
 Q-learning learns from the best next action. It requires a state space that includes the actions
 taken, so that the value of a state is the value of an action (Watkins and Dayan 1992).
-
-The values of agents may add up to that of the team. In sparse cooperative Q-learning each agent
-learns its part of the sum over its neighbors in a coordination graph; a common reward is divided
-equally (Kok and Vlassis 2006). In value decomposition the sum learns from one error: the TD error
-of the sum updates every agent (Sunehag et al. 2018).
 """
 
 from __future__ import annotations
@@ -39,40 +34,18 @@ class Online(Learner):
     R / (1 - discount) and no next state.
     """
 
-    kept: tuple[str, ...] = ("theta", "trace")
-    """Names of saved arrays. Those in `traces` have one row per agent, the others one per row."""
-    traces = ("trace",)
-    fixed_arrays: ClassVar[tuple[str, ...]] = ("theta", "trace")
-    reward_of: Literal["left", "entered"] = "left"
-    """Reward in the TD error of a step: that of the state left or of the state entered."""
-
     def __init__(self, settings: Any, rules: RuleBase, rows: IntArray) -> None:
-        self.settings, self.discount = settings, settings.discount
-        self.rules, self.rows = rules, rows
+        self.settings = settings
+        self.discount = settings.discount
+        self.rules = rules
+        self.rows = rows
         n_rows = int(rows.max()) + 1
-        self.theta: FloatArray = np.zeros((n_rows, rules.n_rules), rules.dtype)
-        self.weights = self.theta
+        self.theta: FloatArray = np.zeros((n_rows, rules.n_rules))
+        self.weights: FloatArray = self.theta
         """Weights that are updated. Agents decide by `theta`, which may be an average of them."""
-        self.trace: FloatArray = np.zeros((len(rows), rules.n_rules), rules.dtype)
+        self.trace: FloatArray = np.zeros((len(rows), rules.n_rules))
         self._previous: FloatArray | None = None
         self._rewards: FloatArray = np.zeros(len(rows))
-
-    @property
-    def of_agents(self) -> FloatArray:
-        """Weights ``(n, n_rules)`` of every agent; not a copy if each has its own row."""
-        return self.weights if len(self.weights) == len(self.rows) else self.weights[self.rows]
-
-    def errors(
-        self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
-    ) -> FloatArray:
-        """Return the TD errors ``(n,)`` of `states` (Eq. 7)."""
-        met = states[:, None]
-        if entered is not None:
-            met = np.empty((len(states), 2, states.shape[1]))
-            met[:, 0], met[:, 1] = states, entered
-        values = self.rules.values_of_agents(self.of_agents, met)
-        ahead = 0.0 if entered is None else self.discount * values[:, 1]
-        return rewards + ahead - values[:, 0]
 
     def begin_episode(self) -> None:
         """Clear the traces."""
@@ -85,17 +58,16 @@ class Online(Learner):
         changed = 0
         entered = np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)).copy()
         if self._previous is not None:
-            rewards = self._rewards if self.reward_of == "left" else entered
-            changed += self._update(self._previous, rewards, states)
+            changed += self._update(self._previous, self._reward_of(self._rewards, entered), states)
         self._previous = states.copy()
         self._rewards = entered
         if terminated:
-            changed += self._update(states, self._rewards / (1.0 - self.discount), None)
+            changed += self._update(states, entered / (1.0 - self.discount), None)
         return changed
 
-    def end_episode(self) -> int:
-        """Return 0, because every step has been learned already."""
-        return 0
+    def _reward_of(self, left: FloatArray, entered: FloatArray) -> FloatArray:
+        """Return the rewards in the TD errors of a step: those of the states left."""
+        return left
 
     @abstractmethod
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
@@ -105,9 +77,8 @@ class Online(Learner):
         """
 
     def _kept(self) -> dict[str, FloatArray]:
-        """Return the arrays that are saved, by name."""
-        own = vars(self)
-        return {name: own[name] for name in self.kept}
+        """Return the arrays that are saved: the trace has a row per agent, others one per row."""
+        return {"theta": self.theta, "trace": self.trace}
 
     def state_dict(self) -> dict[str, FloatArray]:
         """Return weights, traces and the previous states with their rewards."""
@@ -125,7 +96,7 @@ class Online(Learner):
         """Start from the weights of another team, with zero traces."""
         others = former._kept()
         for name, own in self._kept().items():
-            if name not in self.traces:
+            if name != "trace":
                 own[...] = others[name][rows] if others[name].ndim else others[name]
 
 
@@ -136,21 +107,19 @@ class FrozenSettings(LearnerSettings):
     factory: ClassVar[str] = f"{__name__}:Frozen"
 
 
-class Frozen(Online):
+class Frozen(Learner):
     """Never learns: the consequent weights stay zero."""
 
-    kept = fixed_arrays = ("theta",)
+    def __init__(self, settings: LearnerSettings, rules: RuleBase, rows: IntArray) -> None:
+        self.theta: FloatArray = np.zeros((int(rows.max()) + 1, rules.n_rules))
 
-    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
+        """Return 0, because no weight changes."""
         return 0
 
-    def state_dict(self) -> dict[str, FloatArray]:
-        """Return the weights."""
-        return {"theta": self.theta}
-
-    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
-        """Continue from a `state_dict`."""
-        super().load_state_dict({"previous": self.theta[:0], "rewards": self._rewards, **state})
+    def warm_start(self, former: Self, rows: IntArray) -> None:
+        """Start from the weights of another team."""
+        self.theta = former.theta[rows]
 
 
 class TDLambdaSettings(LearnerSettings):
@@ -166,9 +135,6 @@ class TDLambdaSettings(LearnerSettings):
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Number of updates over which the agents average the learned weights to decide; 1: none."""
-    initial_weight: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    """Consequent weight of every rule before learning. With ``order = "full"`` it is the value of
-    every state; above attainable values it favors states that were not visited."""
     reward_of: Literal["left", "entered"] = "left"
     """Reward R in Eq. 7: that of the state left, s_previous, as printed; or that of the state
     entered, as in Section V, where rewards are computed after the move."""
@@ -200,13 +166,17 @@ class TDLambda(Online):
 
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
-        self.reward_of = settings.reward_of
-        self.theta += settings.initial_weight
         self.updates: FloatArray = np.zeros(())
         self._entered: tuple[IntArray, FloatArray] | None = None
         if settings.averaging > 1:
             self.weights = self.theta.copy()
-            self.kept = (*self.kept, "weights", "updates")
+
+    def _reward_of(self, left: FloatArray, entered: FloatArray) -> FloatArray:
+        return left if self.settings.reward_of == "left" else entered
+
+    def _kept(self) -> dict[str, FloatArray]:
+        averaged = {"weights": self.weights, "updates": self.updates}
+        return super()._kept() | (averaged if self.settings.averaging > 1 else {})
 
     def begin_episode(self) -> None:
         """Clear the traces."""
@@ -251,27 +221,27 @@ class OneStep(Online):
     """TD(0) with step sizes divided by the squared lengths of feature vectors."""
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        return self._step(states, self.errors(states, rewards, entered))
-
-    def _step(
-        self, states: FloatArray, delta: FloatArray, lengths: FloatArray | np.float64 | None = None
-    ) -> int:
-        """Add ``alpha delta phi / lengths`` to the weights; return their number.
-
-        Parameters
-        ----------
-        states
-            ``(n, d)`` states with feature vectors phi.
-        delta
-            ``(n,)`` errors.
-        lengths
-            ``(n,)`` or a scalar; by default the squared lengths of phi.
-        """
-        if lengths is None:
-            lengths = self.rules.squared_lengths(states)
-        steps = self.settings.step_size * delta / lengths
+        errors = self._errors(states, rewards, entered)
+        steps = self.settings.step_size * errors / self._lengths(states)
         self.rules.add_features(self.weights, self.rows, states, steps)
         return self.theta.size
+
+    def _errors(
+        self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
+    ) -> FloatArray:
+        """Return the TD errors ``(n,)`` of `states` (Eq. 7)."""
+        if entered is None:
+            return rewards - self._values(states[:, None])[:, 0]
+        values = self._values(np.stack([states, entered], axis=1))
+        return rewards + self.discount * values[:, 1] - values[:, 0]
+
+    def _values(self, states: FloatArray) -> FloatArray:
+        """Return values ``(n, s)`` of states ``(n, s, d)``."""
+        return self.rules.values_of_agents(self.weights[self.rows], states)
+
+    def _lengths(self, states: FloatArray) -> FloatArray:
+        """Return the squared lengths ``(n,)`` of feature vectors, or one number for all."""
+        return self.rules.squared_lengths(states)
 
 
 class OptimisticTDSettings(OneStepSettings):
@@ -295,9 +265,11 @@ class OptimisticTD(OneStep):
     with b the setting `falling`.
     """
 
-    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        delta = self.errors(states, rewards, entered)
-        return self._step(states, np.maximum(delta, self.settings.falling * delta))
+    def _errors(
+        self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
+    ) -> FloatArray:
+        errors = super()._errors(states, rewards, entered)
+        return np.maximum(errors, self.settings.falling * errors)
 
 
 class FMQSettings(OneStepSettings):
@@ -321,8 +293,6 @@ class FMQ(OneStep):
     membership functions it is an approximation.
     """
 
-    kept = ("theta", "weights", "greatest", "hits", "visits", "trace")
-
     def __init__(self, settings: FMQSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
         self.weights = np.zeros_like(self.theta)
@@ -330,6 +300,10 @@ class FMQ(OneStep):
         self.greatest: FloatArray = np.full(shape, -np.inf)
         self.hits: FloatArray = np.zeros(shape)
         self.visits: FloatArray = np.zeros(shape)
+
+    def _kept(self) -> dict[str, FloatArray]:
+        table = {"greatest": self.greatest, "hits": self.hits, "visits": self.visits}
+        return super()._kept() | {"weights": self.weights} | table
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         super()._update(states, rewards, entered)
@@ -384,62 +358,12 @@ class QLearning(OneStep):
         centers = [rules.partitions[column].centers for column in self._columns]
         self._choices = np.array(list(product(*centers)))
 
-    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        delta = self.errors(states, rewards, None)
+    def _errors(
+        self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
+    ) -> FloatArray:
+        errors = super()._errors(states, rewards, None)
         if entered is not None:
             met = np.repeat(entered[:, None], len(self._choices), axis=1)
             met[:, :, self._columns] = self._choices
-            delta += self.discount * self.rules.values_of_agents(self.of_agents, met).max(axis=1)
-        return self._step(states, delta)
-
-
-class SparseCooperativeSettings(OneStepSettings):
-    """Sparse cooperative Q-learning: agents learn the parts of a sum."""
-
-    kind: Literal["sparse-cooperative"] = "sparse-cooperative"
-    factory: ClassVar[str] = f"{__name__}:SparseCooperative"
-
-
-class SparseCooperative(OneStep):
-    """TD(0) for each part of a sum (Kok and Vlassis 2006, Eq. 11, on after-states).
-
-    On entering state s' after state s, agent i of n learns::
-
-        delta_i = R_i(s) + gamma f_i(s') - f_i(s)
-        theta_i = theta_i + alpha delta_i phi_i(s) / |phi_i(s)|^2
-
-    where R_i is its own reward, or R / n for a common reward: the deltas then add up to the TD
-    error of ``sum_i f_i``. The state entered replaces the best next state, which the greedy joint
-    action of the graph leads to.
-    """
-
-    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Update for the step from the previous states to these, each agent by its share."""
-        shared = reward / len(states) if np.ndim(reward) == 0 else reward
-        return super().observe(states, shared, terminated)
-
-
-class ValueDecompositionSettings(OneStepSettings):
-    """Value decomposition: the sum of all values learns from the TD error of the team."""
-
-    kind: Literal["vdn"] = "vdn"
-    factory: ClassVar[str] = f"{__name__}:ValueDecomposition"
-    step_size: Positive = 0.1
-    """alpha, divided by the squared length of all agents' feature vectors together."""
-
-
-class ValueDecomposition(SparseCooperative):
-    """TD(0) on the sum of the agents' values, without the networks of the original.
-
-    On entering state s' after state s, with R the reward of all (the sum, if each has its own)::
-
-        delta   = R(s) + gamma sum_i f_i(s') - sum_i f_i(s)
-        theta_i = theta_i + alpha delta phi_i(s) / sum_j |phi_j(s)|^2
-
-    The state entered replaces the best next state, as in all learners here.
-    """
-
-    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        delta = self.errors(states, rewards, entered).sum()
-        lengths = self.rules.squared_lengths(states).sum()
-        return self._step(states, np.full(len(states), delta), lengths)
+            errors += self.discount * self._values(met).max(axis=1)
+        return errors

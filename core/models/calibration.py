@@ -16,8 +16,6 @@ drift is added to P, which therefore never vanishes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..interface.abilities import Embodiment
@@ -71,10 +69,19 @@ class Calibration(Adaptive[EmbodiedPrediction]):
 
     def __init__(self, settings: CalibrationSettings, n: int, levers: FloatArray) -> None:
         self.settings = settings
-        self.constants: FloatArray = np.zeros(n)
-        self._covariance: FloatArray = settings.prior**2 * np.eye(n)
-        self._root = np.linalg.cholesky(self._covariance)
+        self.memory = {"constants": np.zeros(n), "covariance": settings.prior**2 * np.eye(n)}
         self._units = np.stack([np.ones_like(levers), np.ones_like(levers), levers], axis=1)
+        self.bodies = (self._units,)
+
+    @property
+    def constants(self) -> FloatArray:
+        """Estimated logarithms ``(n,)`` of the constants."""
+        return self.memory["constants"]
+
+    @property
+    def _root(self) -> FloatArray:
+        """Triangular root L of the covariance."""
+        return np.linalg.cholesky(self.memory["covariance"])
 
     @classmethod
     def of(cls, settings: CalibrationSettings, scenario: Scenario) -> Calibration | None:
@@ -98,7 +105,7 @@ class Calibration(Adaptive[EmbodiedPrediction]):
         self, prediction: EmbodiedPrediction, joint_action: IntArray, transition: Transition
     ) -> None:
         """Update the constants if a pushed object moved."""
-        twists = transition.twists
+        twists = transition.measured_twists()
         n_bodies = len(prediction.groups)
         if twists is not None and twists[:-n_bodies].any():
             self.observe(twists, prediction.outcomes(joint_action, self.points))
@@ -128,24 +135,9 @@ class Calibration(Adaptive[EmbodiedPrediction]):
         weighted = slope * (weight[:, None] / noise).ravel()
         posterior = np.linalg.inv(np.eye(n) + weighted @ slope.T)
         root = self._root
-        self.constants += root @ (posterior @ (weighted @ innovation.ravel()))
+        self.memory["constants"] += root @ (posterior @ (weighted @ innovation.ravel()))
         covariance = root @ posterior @ root.T
         # No constant becomes less certain than its prior.
         known = np.diagonal(covariance) + settings.drift**2 < settings.prior**2
-        self._covariance = 0.5 * (covariance + covariance.T) + np.diag(known * settings.drift**2)
-        self._root = np.linalg.cholesky(self._covariance)
-
-    def state_dict(self) -> dict[str, FloatArray]:
-        """Return constants and covariance."""
-        return {"constants": self.constants, "covariance": self._covariance}
-
-    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
-        """Continue from a `state_dict`."""
-        self.constants[:] = state["constants"]
-        self._covariance = state["covariance"].copy()
-        self._root = np.linalg.cholesky(self._covariance)
-
-    def warm_start(self, former: Calibration) -> None:
-        """Start from another calibration if it measures the same kind of bodies."""
-        if np.array_equal(self._units, former._units):
-            self.load_state_dict(former.state_dict())
+        drift = np.diag(known * settings.drift**2)
+        self.memory["covariance"] = 0.5 * (covariance + covariance.T) + drift

@@ -1,6 +1,5 @@
 """Predictions of a learned predictor from one situation."""
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,6 @@ class LearnedPrediction(Prediction):
         self.present = present
         self._reached = predictor.reached(present)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
-        self._first: IntArray | None = None
         n, a, _ = self._reached.shape
         same = (self._reached[:, :, None] == self._reached[:, None]).all(axis=3)
         level = same.argmax(axis=2) if predictor.own_rules else np.tile(np.arange(a), (n, 1))
@@ -38,12 +36,7 @@ class LearnedPrediction(Prediction):
         if joint_actions is not None:
             groups = np.array(predictor.groups)
             places = a ** np.arange(joint_actions.shape[1])[::-1]
-            self._first = first_alike(level[groups[:, None], joint_actions[None]] @ places)
-
-    @cached_property
-    def alike(self) -> IntArray | None:
-        """The first equivalent robot-action index, see `Prediction`."""
-        return self._first
+            self.alike = first_alike(level[groups[:, None], joint_actions[None]] @ places)
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return own variables ``(n, m, n_own)`` and shared ones ``(G, m, d - n_own)``."""

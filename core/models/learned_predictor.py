@@ -20,12 +20,13 @@ import numpy as np
 from ..interface.abilities import horizon_of, partners_of
 from ..interface.scenario import Scenario, Transition, rows_of
 from ..numerics import BoolArray, FloatArray, IntArray
+from ..search.enumeration import combinations
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
-from .adaptive import DynamicsModel
+from .adaptive import Adaptive
 from .learned_prediction import LearnedPrediction
 from .predictors import DrivenBodies, LearnedPredictorSettings, Mirror, driven_states
-from .regression import INTERVAL, RegressionModel, solve_ridge
+from .regression import INTERVAL, solve_ridge
 
 MAX_FEATURES = 4096
 """Maximum number of features of a regression that is solved densely."""
@@ -37,7 +38,7 @@ GRAIN = 1e-3
 """Own variables are rounded to this share of their range, so that equal outcomes are found."""
 
 
-class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
+class LearnedPredictor(Adaptive[LearnedPrediction]):
     """Learns the outcome of actions by regression; see the module.
 
     Parameters
@@ -75,7 +76,7 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
             # The mirror image of an action is unknown, that of an own variable is known.
             mirrored = space.n_own > 0 and partners_of(scenario) is not None
         self.mirror = Mirror.of(scenario) if mirrored else None
-        self.bodies = DrivenBodies(
+        self.driven = DrivenBodies(
             scenario, products=settings.products, memberships=settings.memberships
         )
         self.kinds = rows_of(scenario, np.arange(len(scenario.agents)), shared=True)
@@ -92,12 +93,11 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
         self.joint_actions: IntArray | None = None
         """``(A ** w, w)`` joint actions of a group, if all groups have w agents."""
         if len({*sizes}) == 1:
-            shape = (self.n_actions,) * sizes[0]
-            self.joint_actions = np.indices(shape).reshape(sizes[0], -1).T
-        b, w = self.bodies.members.shape
-        v = len(self.bodies.common)
+            self.joint_actions = combinations(tuple(range(sizes[0])), self.n_actions)
+        b, w = self.driven.members.shape
+        v = len(self.driven.common)
         k = w * (space.n_own or self.n_actions + 1)
-        rules = self.bodies.rules.n_rules
+        rules = self.driven.rules.n_rules
         if k * rules * min(b, 2) > MAX_FEATURES:
             raise ValueError(
                 f"learner.predictor: needs {k * rules * min(b, 2)} regression features, allowed "
@@ -105,6 +105,7 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
             )
         seen = np.where(self.periods > 0.0, [low, high], [[np.inf], [-np.inf]])
         self.memory = self._empty_memory(k, rules, v) | {"seen": seen}
+        self.bodies = [np.array(array.shape) for array in self.memory.values()]
 
     def _empty_memory(self, k: int, rules: int, v: int) -> dict[str, FloatArray]:
         """Return sums and weights before any experience, for k inputs, rules and v variables."""
@@ -171,7 +172,7 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
         m["own_weights"] = np.linalg.solve(gram, m["own_moment"])
 
     def _regress(self, before: FloatArray, joint: IntArray, after: FloatArray) -> None:
-        bodies = self.bodies
+        bodies = self.driven
         m = self.memory
         b, v = bodies.agents.shape
         change = self._apart(after, before)[:, bodies.agents, bodies.columns]
@@ -209,7 +210,7 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
         own = np.zeros_like(moment)
         others = np.zeros_like(moment)
         explained: FloatArray = np.zeros(len(common))
-        if len(self.bodies.members) == 1:
+        if len(self.driven.members) == 1:
             own, explained = self._ridge(each, moment)
             return own, others, explained
         across = of_all - each
@@ -240,7 +241,7 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
         else:
             each = np.eye(self.n_actions, self.n_actions + 1)[joint_actions]
             each[..., -1] = 1.0
-        members = self.bodies.members
+        members = self.driven.members
         return each[:, members].reshape(len(each), len(members), -1)
 
     def reached(self, states: FloatArray) -> FloatArray:
@@ -254,7 +255,7 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
 
     def after(self, states: FloatArray, drivers: FloatArray) -> FloatArray:
         """Return the next shared variables ``(G, m, s)`` for drivers ``(m, b, k)``."""
-        bodies = self.bodies
+        bodies = self.driven
         m = self.memory
         columns = bodies.columns[0]
         present = states[bodies.agents, bodies.columns]
@@ -276,12 +277,6 @@ class LearnedPredictor(DynamicsModel, RegressionModel[LearnedPrediction]):
         )
         body, place = bodies.places
         return np.ascontiguousarray(np.moveaxis(moved[:, body, place], 0, 1))
-
-    def warm_start(self, former: LearnedPredictor) -> None:
-        """Start from another predictor if its bodies have the same variables."""
-        theirs = former.memory
-        if all(theirs[name].shape == array.shape for name, array in self.memory.items()):
-            self.load_state_dict(theirs)
 
     def _apart(self, states: FloatArray, others: FloatArray) -> FloatArray:
         """Return differences of states ``(..., d)``; those of periodic variables are wrapped."""

@@ -13,11 +13,12 @@ from ..interface.abilities import Embodiment
 from ..interface.prediction import EmbodiedPrediction
 from ..interface.scenario import Scenario, Transition
 from ..numerics import FloatArray, IntArray
+from .adaptive import Adaptive
 from .predictors import PosePredictorSettings
-from .regression import INTERVAL, RegressionModel, solve_ridge
+from .regression import INTERVAL, solve_ridge
 
 
-class PoseModel(RegressionModel[EmbodiedPrediction]):
+class PoseModel(Adaptive[EmbodiedPrediction]):
     """Weights with which bodies predict their poses, see `Assumptions.regressions`.
 
     Parameters
@@ -41,7 +42,7 @@ class PoseModel(RegressionModel[EmbodiedPrediction]):
             )
         self.horizon = settings.horizon
         self._ridge = settings.ridge
-        self._levers = scenario.levers
+        self.bodies = (scenario.levers,)
         self.memory = {"decisions": np.zeros(1)}
         for i, (f, t) in enumerate(scenario.regression_shapes):
             self.memory[f"gram{i}"] = np.zeros((f, f))
@@ -70,8 +71,3 @@ class PoseModel(RegressionModel[EmbodiedPrediction]):
         for i in range(len(self.weights)):
             sums = self.memory[f"gram{i}"], self.memory[f"moment{i}"]
             self.memory[f"weights{i}"] = solve_ridge(*sums, self._ridge)
-
-    def warm_start(self, former: PoseModel) -> None:
-        """Start from another model if it describes the same bodies."""
-        if np.array_equal(self._levers, former._levers):
-            self.load_state_dict(former.memory)

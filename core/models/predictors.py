@@ -28,7 +28,6 @@ from ..plugins.settings import PartSettings, Positive
 from ..values.partitions import Partition
 from ..values.rule_base import RuleBase
 from ..values.triangular import Layout, active_rules
-from .adaptive import DynamicsModel
 
 
 class GivenPredictor(PartSettings):
@@ -41,7 +40,6 @@ class StaticPredictor(PartSettings):
     """Persistence: nothing changes, whatever the action. The baseline of all predictors."""
 
     kind: Literal["static"] = "static"
-    factory: ClassVar[str] = f"{__name__}:Persistence"
 
 
 class LearnedPredictorSettings(PartSettings):
@@ -88,17 +86,6 @@ Predictor = Annotated[
     Field(discriminator="kind"),
 ]
 """The settings of any predictor, distinguished by ``kind``."""
-
-
-class Persistence(DynamicsModel):
-    """Predicts that nothing changes."""
-
-    def __init__(self, settings: StaticPredictor, scenario: Scenario) -> None:
-        pass
-
-    def predict(self, states: FloatArray) -> StaticPrediction:
-        """Predict from states ``(n, d)``."""
-        return StaticPrediction(states)
 
 
 class StaticPrediction(Prediction):

@@ -1,31 +1,11 @@
-"""Models that learn by ridge regression on sums over all experience (Hoerl and Kennard 1970)."""
-
-from __future__ import annotations
-
-from collections.abc import Mapping
+"""Ridge regression on sums over all experience (Hoerl and Kennard 1970)."""
 
 import numpy as np
 
 from ..numerics import FloatArray
-from .adaptive import Adaptive, P
 
 INTERVAL = 100
 """Number of decisions between regressions within an episode."""
-
-
-class RegressionModel(Adaptive[P]):
-    """A model that keeps sums over all experience, so that memory and time do not grow."""
-
-    memory: dict[str, FloatArray]
-    """Sums over all experience, and the weights computed from them."""
-
-    def state_dict(self) -> dict[str, FloatArray]:
-        """Return sums over all experience, and the weights computed from them."""
-        return self.memory
-
-    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
-        """Continue from a `state_dict`."""
-        self.memory = {name: np.array(state[name]) for name in self.memory}
 
 
 def solve_ridge(gram: FloatArray, moment: FloatArray, ridge: float) -> FloatArray:

@@ -17,7 +17,7 @@ unaffected; the reported standard deviations are multiplied by this ratio (Birge
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -74,9 +74,7 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
     def __init__(self, settings: SelfModelSettings, nominal: Sequence[FloatArray]) -> None:
         self._settings = settings
-        self._nominal = [np.array(effect, dtype=float) for effect in nominal]
-        self.effects = tuple(effect.copy() for effect in self._nominal)
-        """By body, the estimated ``(3, w + 1)`` effect of its wheels."""
+        self.bodies = [np.array(effect, dtype=float) for effect in nominal]
         # A turning rate is measured in units of the nominal body's own turning per wheel speed.
         turning = [max(1.0, float(np.abs(effect[2]).max())) for effect in nominal]
         self._units = [np.array([1.0, 1.0, unit]) for unit in turning]
@@ -84,9 +82,19 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         of_constant = settings.prior_constant**2
         wheels = [effect.shape[1] - 1 for effect in nominal]
         self._priors = [np.diag([of_effect] * w + [of_constant]) for w in wheels]
-        self._covariances = [np.stack([prior] * 3) for prior in self._priors]
-        # Mean squared innovation of each component in units of the expected square.
-        self._ratios: list[FloatArray] = [np.ones(3) for _ in nominal]
+        # By body, the effect, the covariance of each of its rows, and the mean squared innovation
+        # of each row in units of the expected square.
+        self.memory = {f"effect{r}": effect.copy() for r, effect in enumerate(self.bodies)}
+        for r, prior in enumerate(self._priors):
+            self.memory |= {f"covariance{r}": np.stack([prior] * 3), f"ratio{r}": np.ones(3)}
+
+    def _by_body(self, name: str) -> tuple[FloatArray, ...]:
+        return tuple(self.memory[f"{name}{r}"] for r in range(len(self.bodies)))
+
+    @property
+    def effects(self) -> tuple[FloatArray, ...]:
+        """By body, the estimated ``(3, w + 1)`` effect of its wheels."""
+        return self._by_body("effect")
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:
@@ -94,9 +102,9 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
 
         Those of the filters are multiplied by the ratio of actual to expected innovations.
         """
-        larger = (np.sqrt(np.maximum(1.0, ratio)) for ratio in self._ratios)
+        larger = (np.sqrt(np.maximum(1.0, ratio)) for ratio in self._by_body("ratio"))
         scales = (scale[:, None] for scale in map(np.multiply, self._units, larger))
-        own = (np.sqrt(np.diagonal(c, axis1=1, axis2=2)) for c in self._covariances)
+        own = (np.sqrt(np.diagonal(c, axis1=1, axis2=2)) for c in self._by_body("covariance"))
         return tuple(map(np.multiply, scales, own))
 
     @classmethod
@@ -122,11 +130,12 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         The predicted effect of contacts is subtracted: a body that moves a load is slow, not
         broken.
         """
-        if transition.twists is None:
+        twists = transition.measured_twists()
+        if twists is None:
             return
         speeds = prediction.commands(joint_action)
         slips = prediction.slips(joint_action)
-        free = transition.twists[-len(slips) :] - slips
+        free = twists[-len(slips) :] - slips
         for body, group in enumerate(prediction.groups):
             self.observe(body, speeds[list(group)], free[body])
 
@@ -134,10 +143,10 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
         """Update by a twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
         settings = self._settings
         regressor = np.append(speeds, 1.0)
-        ratio = self._ratios[body]
+        ratio = self.memory[f"ratio{body}"]
         noise = settings.noise**2
-        effect = self.effects[body]
-        covariance = self._covariances[body]
+        effect = self.memory[f"effect{body}"]
+        covariance = self.memory[f"covariance{body}"]
         for row, unit in enumerate(self._units[body]):
             innovation = float(twist[row] - effect[row] @ regressor) / unit
             carried = covariance[row] @ regressor
@@ -150,20 +159,3 @@ class SelfModel(Adaptive[EmbodiedPrediction]):
             gain = carried / expected
             effect[row] += gain * innovation * unit
             covariance[row] -= np.outer(gain, carried)
-
-    def state_dict(self) -> dict[str, FloatArray]:
-        """Return effects, covariances and ratios of innovations by body."""
-        kept = {"effect": self.effects, "covariance": self._covariances, "ratio": self._ratios}
-        return {f"{name}{r}": array for name in kept for r, array in enumerate(kept[name])}
-
-    def load_state_dict(self, state: Mapping[str, FloatArray]) -> None:
-        """Continue from a `state_dict`."""
-        for name, own in self.state_dict().items():
-            own[:] = state[name]
-
-    def warm_start(self, former: SelfModel) -> None:
-        """Start from another self-model if its bodies have the same geometry."""
-        mine = self._nominal
-        theirs = former._nominal
-        if len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs)):
-            self.load_state_dict(former.state_dict())

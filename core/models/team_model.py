@@ -7,12 +7,12 @@ from typing import Any
 from ..interface.experience import Experience, Observation
 from ..interface.prediction import Assumptions, EmbodiedPrediction, Prediction
 from ..interface.scenario import Scenario
-from ..numerics import FloatArray
 from ..plugins.settings import PartSettings
-from .adaptive import Adaptive, DynamicsModel
+from .adaptive import Adaptive
 from .calibration import Calibration, CalibrationSettings
+from .learned_predictor import LearnedPredictor
 from .pose_model import PoseModel
-from .predictors import GivenPredictor, PosePredictorSettings
+from .predictors import GivenPredictor, PosePredictorSettings, StaticPrediction, StaticPredictor
 from .self_model import SelfModel, SelfModelSettings
 
 
@@ -52,7 +52,8 @@ class TeamModel:
     ) -> None:
         self.self_model = SelfModel.of(self_model, scenario)
         self.calibration = Calibration.of(calibration, scenario)
-        self.predictor: DynamicsModel | PoseModel | None = None
+        self.predictor: LearnedPredictor | PoseModel | None = None
+        self._is_static = isinstance(predictor, StaticPredictor)
         if not isinstance(predictor, GivenPredictor):
             named = f"learner.predictor.kind = {predictor.kind!r}"
             needs_given = not isinstance(predictor, PosePredictorSettings)
@@ -65,7 +66,8 @@ class TeamModel:
                     f"learner.{name}.enabled: adapts the predictor of the scenario, but {named} "
                     "replaces it; use 'given'"
                 )
-            self.predictor = predictor.build(scenario)
+            if not self._is_static:
+                self.predictor = predictor.build(scenario)
         parts = {
             "self_model": self.self_model,
             "calibration": self.calibration,
@@ -75,34 +77,22 @@ class TeamModel:
             name: part for name, part in parts.items() if isinstance(part, Adaptive)
         }
 
-    def predict(self, seen: Observation, errors: FloatArray | None = None) -> Prediction:
-        """Return the prediction from the present states.
-
-        Parameters
-        ----------
-        seen
-            Present observation.
-        errors
-            ``(c,)`` errors of the logarithms of the predictor's constants, or None.
-        """
-        if isinstance(self.predictor, DynamicsModel):
+    def predict(self, seen: Observation) -> Prediction:
+        """Return the prediction from the present states."""
+        if self._is_static:
+            return StaticPrediction(seen.states)
+        if isinstance(self.predictor, LearnedPredictor):
             return self.predictor.predict(seen.states)
-        parts = (self.predictor, self.self_model, self.calibration, errors)
-        if all(part is None for part in parts):
+        if not self.adaptive:
             return seen.prediction
         if not isinstance(seen.prediction, EmbodiedPrediction):
-            raise ValueError(
-                "learner.self_model, calibration, decision.errors: the scenario has no bodies"
-            )
+            raise ValueError("learner.self_model, calibration: the scenario has no bodies")
         assumed = Assumptions(effects=None if self.self_model is None else self.self_model.effects)
         if self.predictor is not None:
             weights, horizon = self.predictor.weights, self.predictor.horizon
             assumed = assumed._replace(regressions=weights, decisions=horizon)
-        else:
-            constants = None if self.calibration is None else self.calibration.constants
-            if errors is not None:
-                constants = errors if constants is None else constants + errors
-            assumed = assumed._replace(constants=constants)
+        elif self.calibration is not None:
+            assumed = assumed._replace(constants=self.calibration.constants)
         return seen.prediction.assuming(assumed)
 
     def learn(self, experience: Experience, prediction: Prediction) -> None:

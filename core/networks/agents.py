@@ -7,7 +7,7 @@ noise to the logits. Axes are E environments, n agents and A actions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -15,10 +15,10 @@ import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox
-from ..interface.agents import AgentContext, Agents, Counts, StateDict, select_prefix
+from ..interface.agents import AgentContext, Agents, Counts, StateDict, add_prefix, select_prefix
 from ..interface.environments import Transitions
 from ..interface.experience import Experience, Observation
-from ..interface.scenario import Scenario
+from ..interface.scenario import check_transfer, owners_of
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray, set_words, words_of
 from .inputs import InputEncoder
 from .policy import InputNames, Policy, log_sum_exp
@@ -88,7 +88,9 @@ class PPOAgents(Agents[PolicyInputs]):
         self.settings = settings
         self.scenario = scenario
         self.members = context.members
-        self.encoder = InputEncoder(scenario, numbered=settings.numbered)
+        self.encoder = InputEncoder(
+            scenario, numbered=settings.numbered, joins=settings.critic == "central"
+        )
         self._n_actions = len(scenario.action_set)
         # Messages that fail may reach an agent from anyone who acts before it, one after the other.
         is_unreliable = context.messages_fail and settings.uses_hierarchy
@@ -107,52 +109,40 @@ class PPOAgents(Agents[PolicyInputs]):
             for name, rows in self._rows.items()
         }
         self._groups: dict[bytes, list[tuple[Policy, IntArray]]] = {}
-        self._counts = Counts()
+        self.counts = Counts()
+        """Number of actions evaluated."""
         if is_unreliable:  # initial weights and random numbers as without failures
             self.warm_start(type(self)(settings, replace(context, messages_fail=False)))
 
     def _rows_by_policy(self) -> dict[str, IntArray]:
         """Return by policy the rows ``(k,)`` of `PolicyInputs.actor` for which it acts."""
-        owners: Mapping[str, Sequence[str]] = {
-            "all": ("all",) * len(self.scenario.agents),
-            "role": self.scenario.roles,
-            "own": self.scenario.agents,
-        }
-        names = np.take(owners[self.settings.weights], self.members)
+        weights = self.settings.weights
+        if weights == "all":
+            return {"all": self.members}
+        names = np.array(owners_of(self.scenario, self.members, shared=weights == "role"))
         return {str(name): self.members[names == name] for name in np.unique(names)}
 
     def _policy_shape(self) -> PolicyShape:
         """Return the sizes of inputs and actions of every policy."""
-        widths = len(self.told_names), len(self.encoder.own_names), self._n_joint
+        encoder = self.encoder
+        widths = len(self.told_names), len(encoder.own_names), len(encoder.joint_names)
         return PolicyShape(*widths, n_heads=1, n_actions=self._n_actions)
-
-    @property
-    def _n_joint(self) -> int:
-        return len(self.encoder.joint_names) if self.settings.critic == "central" else 0
-
-    @property
-    def counts(self) -> Counts:
-        """Number of actions evaluated."""
-        return self._counts
 
     @property
     def weight_bytes(self) -> int:
         """Memory of the weights of all policies and critics [bytes]."""
-        return sum(policy.weight_bytes for policy in self.policies.values())
+        return sum(policy.weights.nbytes for policy in self.policies.values())
 
     @property
     def input_names(self) -> InputNames:
         """Names of the inputs of actors and critics."""
         own = self.encoder.own_names
-        joint = self.encoder.joint_names if self._n_joint else []
-        return InputNames([*self.told_names, *own], [*own, *joint])
+        return [*self.told_names, *own], [*own, *self.encoder.joint_names]
 
     def _encode(self, states: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return own inputs ``(E, rows, n_own)`` and joint inputs ``(E, n_joint)`` of states."""
         own = self.encoder.own(states)
-        if self._n_joint:
-            return own, self.encoder.joint(own)
-        return own, np.zeros((len(own), 0), np.float32)
+        return own, self.encoder.joint(own)
 
     def observe(self, seen: Observation, *, explore: bool) -> PolicyInputs:
         """Return the inputs of a decision, with noise if the agents explore."""
@@ -187,7 +177,7 @@ class PPOAgents(Agents[PolicyInputs]):
     def _choose(self, inputs: PolicyInputs, inbox: Inbox) -> IntArray:
         """Return the actions of a stage, which have the greatest sum of logit and noise."""
         logits = inputs.logits[:, inbox.agents]
-        self._counts.joint_actions += logits.size
+        self.counts.joint_actions += logits.size
         chosen: IntArray = (logits + inputs.noise[:, inbox.agents]).argmax(axis=2)
         return chosen.reshape(*inputs.batch_shape, -1)
 
@@ -237,18 +227,11 @@ class PPOAgents(Agents[PolicyInputs]):
         """Return logits ``(E, k, h, A)`` and actions ``(E, k, h)`` of the rows of a policy."""
         return logits[:, rows, None], joint[:, rows, None]
 
-    def _check(self, scenario: Scenario) -> None:
-        """Refuse a scenario with other states or actions."""
-        if scenario.state_space != self.scenario.state_space:
-            raise ValueError(f"{self._trained(scenario)}: the state spaces differ")
-        if scenario.action_set != self.scenario.action_set:
-            raise ValueError(f"{self._trained(scenario)}: the actions differ")
-
-    def _trained(self, scenario: Scenario) -> str:
-        there, here = (
-            f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (self.scenario, scenario)
-        )
-        return f"a team trained with {there} cannot act with {here}"
+    def _transfer_problem(self, former: Self) -> str:
+        """Return why other agents' policies cannot be used here, or nothing."""
+        if self.policies.keys() == former.policies.keys():
+            return ""
+        return f"learner.weights = {self.settings.weights!r}; with 'all', all agents share theirs"
 
     def warm_start(self, former: Self) -> None:
         """Start with the weights of agents with the same settings elsewhere.
@@ -258,12 +241,7 @@ class PPOAgents(Agents[PolicyInputs]):
         ValueError
             If states, actions, or the owners of weights differ; one line.
         """
-        former._check(self.scenario)
-        if self.policies.keys() != former.policies.keys():
-            raise ValueError(
-                f"{former._trained(self.scenario)}: learner.weights = {self.settings.weights!r}; "
-                "with 'all', all agents share theirs"
-            )
+        check_transfer(former.scenario, self.scenario, self._transfer_problem(former))
         for name, policy in self.policies.items():
             policy.warm_start(former.policies[name], self.input_names, former.input_names)
         self.rng.bit_generator.state = former.rng.bit_generator.state
@@ -272,7 +250,7 @@ class PPOAgents(Agents[PolicyInputs]):
         """Return the state of the generator and of all policies."""
         state: StateDict = {"generator": words_of(self.rng)}
         for name, policy in self.policies.items():
-            state |= {f"{name}.{key}": array for key, array in policy.state_dict().items()}
+            state |= add_prefix(f"{name}.", policy.state_dict())
         return state
 
     def load_state_dict(self, state: Mapping[str, AnyArray]) -> None:
@@ -309,7 +287,7 @@ class CentralPPOAgents(PPOAgents):
     @property
     def input_names(self) -> InputNames:
         """Names of the inputs of actor and critic."""
-        return InputNames(self.encoder.joint_names, self.encoder.joint_names)
+        return self.encoder.joint_names, self.encoder.joint_names
 
     def _encode(self, states: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the inputs ``(E, 1, n_own)`` of the policy; there are no others."""
@@ -332,11 +310,9 @@ class CentralPPOAgents(PPOAgents):
         """Return logits ``(E, 1, h, A)`` and actions ``(E, 1, h)``."""
         return logits[:, None, self.members], joint[:, None, self.members]
 
-    def _check(self, scenario: Scenario) -> None:
-        """Refuse a scenario with other states, actions or agents."""
-        super()._check(scenario)
-        if tuple(scenario.agents) != tuple(self.scenario.agents):
-            raise ValueError(f"{self._trained(scenario)}: one policy acts for all of them")
+    def _transfer_problem(self, former: Self) -> str:
+        is_same = tuple(former.scenario.agents) == tuple(self.scenario.agents)
+        return "" if is_same else "one policy acts for all of them"
 
 
 def senders_of(hierarchy: Hierarchy) -> list[int]:

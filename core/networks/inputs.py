@@ -22,6 +22,8 @@ class InputEncoder:
         Scenario of the states.
     numbered
         Whether the inputs of an agent contain its number, one-hot.
+    joins
+        Whether there are joint inputs.
 
     Attributes
     ----------
@@ -38,7 +40,7 @@ class InputEncoder:
     ((2, 4), (4,))
     """
 
-    def __init__(self, scenario: Scenario, *, numbered: bool = True) -> None:
+    def __init__(self, scenario: Scenario, *, numbered: bool = True, joins: bool = True) -> None:
         space = scenario.state_space
         n_agents = len(scenario.agents)
         self._low, self._span = space.ranges
@@ -55,6 +57,7 @@ class InputEncoder:
         firsts = [group[0] for group in scenario.groups]
         entries = [(i, k) for i in range(n_agents) for k in np.flatnonzero(columns < space.n_own)]
         entries += [(i, k) for i in firsts for k in np.flatnonzero(columns >= space.n_own)]
+        entries = entries if joins else []
         self.joint_names = [f"{scenario.agents[i]}: {names[k]}" for i, k in entries]
         self._joint: IntArray = np.array([i * len(self.own_names) + k for i, k in entries], int)
 

@@ -169,34 +169,21 @@ class RunningMoments:
     """Mean and variance of all values so far, updated by batches (Chan et al. 1979)."""
 
     def __init__(self) -> None:
-        self._count = 1e-4
-        self._mean = 0.0
-        self._squares = 1e-4
+        self.memory = np.array([1e-4, 0.0, 1e-4])
+        """Number of values, their mean, and the sum of squared deviations."""
 
     def add(self, values: FloatArray) -> None:
         """Add values of any shape."""
+        count, former, squares = self.memory.tolist()
         size = float(values.size)
         mean = float(values.mean())
-        gap = mean - self._mean
-        total = self._count + size
-        self._squares += float(((values - mean) ** 2).sum()) + gap**2 * self._count * size / total
-        self._mean += gap * size / total
-        self._count = total
-
-    @property
-    def mean(self) -> float:
-        """Mean so far."""
-        return self._mean
+        gap = mean - former
+        total = count + size
+        squares += float(((values - mean) ** 2).sum()) + gap**2 * count * size / total
+        self.memory[:] = total, former + gap * size / total, squares
 
     @property
     def deviation(self) -> float:
         """Standard deviation so far."""
-        return float(np.sqrt(self._squares / self._count))
-
-    def state_dict(self) -> AnyArray:
-        """Return the moments ``(3,)``."""
-        return np.array([self._count, self._mean, self._squares])
-
-    def load_state_dict(self, state: AnyArray) -> None:
-        """Continue from a `state_dict`."""
-        self._count, self._mean, self._squares = state.tolist()
+        count, _, squares = self.memory.tolist()
+        return float(np.sqrt(squares / count))

@@ -13,11 +13,10 @@ environments, k agents, h heads and A choices of a head.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
-from ..interface.agents import StateDict, select_prefix
+from ..interface.agents import StateDict, add_prefix, select_prefix
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
 from .mlp import MLP, Adam, RunningMoments
 from .rollout import Batch, PolicyShape, Rollout, generalized_advantages
@@ -31,11 +30,8 @@ ACTOR_OUTPUT_GAIN = 0.01
 CRITIC_OUTPUT_GAIN = 1.0
 
 
-class InputNames(NamedTuple):
-    """Names of the inputs of both networks."""
-
-    actor: list[str]
-    critic: list[str]
+InputNames = tuple[list[str], list[str]]
+"""Names of the inputs of actors, and of critics."""
 
 
 class Policy:
@@ -77,23 +73,13 @@ class Policy:
         self._decisions = 0
         self.rollout = Rollout(settings.rollout, settings.environments, n_agents, shape)
 
-    @property
-    def weight_bytes(self) -> int:
-        """Memory of the weights [bytes]."""
-        return self.weights.nbytes
-
-    @property
-    def _normalizes_values(self) -> bool:
-        return self.settings.normalized == "values"
-
     def logits(self, actor_inputs: FloatArray) -> FloatArray:
         """Return the logits ``(m, h, A)`` for inputs of the actor ``(m, n_told + n_own)``."""
         return self.actor(actor_inputs).reshape(-1, self.shape.n_heads, self.shape.n_actions)
 
     def values(self, own: FloatArray, joint: FloatArray) -> FloatArray:
         """Return the values ``(..., k)`` of inputs ``(..., k, n_own)`` and ``(..., n_joint)``."""
-        inputs = self._critic_inputs(own, joint)
-        return self._values(inputs).reshape(own.shape[:-1])
+        return self.critic(self._critic_inputs(own, joint)).reshape(own.shape[:-1])
 
     def _critic_inputs(self, own: FloatArray, joint: FloatArray) -> FloatArray:
         """Return the inputs of the critic ``(m, n_own + n_joint)``, a row for every agent."""
@@ -101,12 +87,6 @@ class Policy:
         inputs[..., : own.shape[-1]] = own
         inputs[..., own.shape[-1] :] = joint[..., None, :]
         return inputs.reshape(-1, inputs.shape[-1])
-
-    def _values(self, critic_inputs: FloatArray) -> FloatArray:
-        values = self.critic(critic_inputs)
-        if self._normalizes_values:
-            return values * self._moments.deviation + self._moments.mean
-        return values
 
     def append(
         self, inputs: tuple[FloatArray, FloatArray], logits: FloatArray, actions: IntArray,
@@ -148,8 +128,6 @@ class Policy:
 
     def _normalize(self, rewards: FloatArray, last: BoolArray) -> FloatArray:
         """Return rewards ``(E, k)`` divided by the standard deviation of discounted returns."""
-        if self._normalizes_values:
-            return rewards
         self._returns = self.settings.discount * self._returns + rewards
         self._moments.add(self._returns)
         self._returns[last] = 0.0
@@ -197,21 +175,17 @@ class Policy:
         critic_inputs = self._critic_inputs(
             rollout.actor_inputs[..., self.shape.n_told :], rollout.joint_inputs
         )
-        values = self._values(critic_inputs).reshape(rollout.rewards.shape)
+        values = self.critic(critic_inputs).reshape(rollout.rewards.shape)
         advantages = generalized_advantages(
             rollout.rewards, values, next_values, rollout.last, self.settings
         )
-        returns = advantages + values
-        if self._normalizes_values:
-            self._moments.add(returns)
-            returns = (returns - self._moments.mean) / self._moments.deviation
         return Batch(
             actor_inputs=rollout.actor_inputs.reshape(-1, rollout.actor_inputs.shape[-1]),
             critic_inputs=critic_inputs,
             actions=rollout.actions.reshape(-1, self.shape.n_heads),
             log_probs=rollout.log_probs.ravel(),
             advantages=advantages.ravel().astype(np.float32),
-            returns=returns.ravel().astype(np.float32),
+            returns=(advantages + values).ravel().astype(np.float32),
         )
 
     def loss_and_grad(self, batch: Batch, entropy: float) -> float:
@@ -255,13 +229,12 @@ class Policy:
     def state_dict(self) -> StateDict:
         """Return weights, moments, and the unfinished rollout."""
         steps = self.rollout.steps
-        rollout = {f"rollout.{k}": a[:steps].copy() for k, a in self.rollout.arrays().items()}
-        adam = {f"adam.{name}": array for name, array in self._adam.state_dict().items()}
+        rollout = {name: array[:steps].copy() for name, array in self.rollout.arrays().items()}
         return {
-            **rollout,
-            **adam,
+            **add_prefix("rollout.", rollout),
+            **add_prefix("adam.", self._adam.state_dict()),
             "weights": self.weights.copy(),
-            "moments": self._moments.state_dict(),
+            "moments": self._moments.memory.copy(),
             "returns": self._returns.copy(),
             "decisions": np.array(self._decisions),
         }
@@ -275,16 +248,14 @@ class Policy:
             If it is that of another policy; one line.
         """
         own = self.state_dict()
-        for name in own:
-            shape = state[name].shape if name in state else "missing"
-            expected = own[name].shape
-            if name.startswith("rollout.") and shape != "missing":
-                shape, expected = shape[1:], expected[1:]
-            if shape != expected:
-                raise ValueError(f"team: saved {name}: {shape}, this team's: {expected}")
+        for name, array in own.items():
+            first = int(name.startswith("rollout."))  # the number of steps may differ
+            shape = state[name].shape[first:] if name in state else "missing"
+            if shape != array.shape[first:]:
+                raise ValueError(f"team: saved {name}: {shape}, this team's: {array.shape[first:]}")
         self.weights[:] = state["weights"]
         self._adam.load_state_dict(select_prefix("adam.", state))
-        self._moments.load_state_dict(state["moments"])
+        self._moments.memory[:] = state["moments"]
         self._returns = state["returns"].copy()
         self._decisions = int(state["decisions"])
         rollout = select_prefix("rollout.", state)
@@ -302,7 +273,7 @@ class Policy:
         for (network, other), own, known in zip(networks, names, former_names, strict=True):
             row_of = {name: row for row, name in enumerate(known)}
             network.warm_start(other, [row_of.get(name) for name in own])
-        self._moments.load_state_dict(former._moments.state_dict())
+        self._moments.memory[:] = former._moments.memory
 
 
 def log_sum_exp(logits: FloatArray) -> FloatArray:

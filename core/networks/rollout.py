@@ -45,14 +45,7 @@ class Batch(NamedTuple):
 
     def take(self, rows: IntArray) -> Batch:
         """Return the minibatch of some rows."""
-        return Batch(
-            actor_inputs=self.actor_inputs.take(rows, axis=0),
-            critic_inputs=self.critic_inputs.take(rows, axis=0),
-            actions=self.actions.take(rows, axis=0),
-            log_probs=self.log_probs.take(rows),
-            advantages=self.advantages.take(rows),
-            returns=self.returns.take(rows),
-        )
+        return Batch._make(array.take(rows, axis=0) for array in self)
 
 
 class Rollout:

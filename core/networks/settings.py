@@ -38,8 +38,6 @@ class NetworkSettings(TeamSettings):
     """Weight of the entropy bonus."""
     environments: Annotated[int, Field(ge=1, le=4096)] = 1
     """Number of environments that are stepped at once; 2 or more need a budget in decisions."""
-    normalized: Literal["rewards", "values"] = "rewards"
-    """What is divided by the standard deviation of returns: rewards, or targets of critics."""
     learning_rate_decisions: Count | None = None
     """Decisions, of all environments, over which `learning_rate` falls linearly to 0. Without a
     number it stays constant."""
@@ -60,7 +58,7 @@ class PPOSettings(NetworkSettings):
     kind_of_agents = f"{CORE}.networks.agents:CentralPPOAgents"
     weights: ClassVar[str] = "all"
     numbered: ClassVar[bool] = True
-    critic: ClassVar[str] = "own"
+    critic: ClassVar[str] = "central"
     value_of: ClassVar[str] = "team"
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 
 
-def stream_of(seed: int | np.random.SeedSequence, key: int) -> np.random.Generator:
-    """Return the random stream of a key, independent of other streams of the seed.
+def stream_of(seed: int | np.random.SeedSequence, *keys: int) -> np.random.Generator:
+    """Return the random stream of some keys, independent of other streams of the seed.
 
     Examples
     --------
@@ -15,7 +15,7 @@ def stream_of(seed: int | np.random.SeedSequence, key: int) -> np.random.Generat
     True
     """
     root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    child = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, key))
+    child = np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, *keys))
     return np.random.default_rng(child)
 
 

@@ -96,22 +96,9 @@ class BestResponseSettings(EvaluatorSettings):
         return BestResponse(problem, self.sweeps)
 
 
-class _BodyValues(NamedTuple):
-    """Values of the joint actions of one body's agents, as last computed."""
-
-    concerned: IntArray
-    """Agents that share the averaged value."""
-    plan: IntArray
-    """``(n,)`` actions of the other agents."""
-    free: tuple[int, ...]
-    """The k agents that vary their actions."""
-    values: FloatArray
-    """``(A,) * k`` values by the action of each free agent."""
-
-    def is_valid(self, concerned: IntArray, plan: IntArray) -> bool:
-        """Return whether the values hold for these agents and this plan."""
-        changed = np.flatnonzero(self.plan != plan).tolist()
-        return self.concerned is concerned and {*changed} <= {*self.free}
+_BodyValues = tuple[IntArray, IntArray, tuple[int, ...], FloatArray]
+"""Values of the joint actions of one body's agents: agents that share the averaged value, actions
+``(n,)`` of all agents, the k agents that vary theirs, and values ``(A,) * k``."""
 
 
 class BestResponse(Aggregation):
@@ -149,7 +136,6 @@ class BestResponse(Aggregation):
         self._widest = max(map(len, groups))
         sizes = range(max(2, self._widest), 0, -1)  # the largest is refused before others are made
         self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in sizes}
-        self._numbers = np.arange(len(self._actions[sizes[0]]))
         # By agent: the agents that it searches over and itself, in the order of decision; those of
         # its body among them; the agents outside the search.
         searched = [{i, *hierarchy.searched(i)} for i in range(n)]
@@ -163,7 +149,7 @@ class BestResponse(Aggregation):
         self._decides_jointly = self._can_decide_jointly()
         self._plans: dict[int, IntArray] = {}
         self._last: _BodyValues | None = None
-        self._equivalent: list[tuple[IntArray, IntArray]] = []
+        self._equivalent: list[IntArray] = []
 
     def _need(self, agent: int) -> int:
         """Return the maximum number of joint actions that an agent tries without a budget."""
@@ -177,16 +163,15 @@ class BestResponse(Aggregation):
     def _can_decide_jointly(self) -> bool:
         """Return whether all agents share one plan and decide body by body, by the team's value."""
         problem = self.problem
-        first = problem.hierarchy.order[0]
-        whole = {*problem.groups}
-        bodies = [self._own[i] for i in problem.hierarchy.order if self._own[i] in whole]
+        order = problem.hierarchy.order
+        bodies = [self._own[i] for i in order if self._own[i] in problem.groups]
         return (
-            {*self._planner} == {first}
+            {*self._planner} == {order[0]}
             and all(self._shares_plan)
             and problem.rule == "value"
             and problem.value_of == "team"
             and self._sweeps == 1
-            and [i for agents in bodies for i in agents] == [*problem.hierarchy.order]
+            and tuple(i for agents in bodies for i in agents) == order
             and len({*map(len, problem.groups)}) == 1
             and (problem.budget is None or self._joint_need() <= problem.budget)
         )
@@ -211,15 +196,19 @@ class BestResponse(Aggregation):
             free = (agent,)
         plan = self._plan(context, self._shares[agent] - self.n_actions ** len(free))
         last, concerned = self._last, self.concerned[agent]
-        if last is not None and not last.is_valid(concerned, plan):
-            last = None
-        if last is not None and set(free) < set(last.free):
-            values = last.values[*(slice(None) if i in free else plan[i] for i in last.free)]
+        value = None
+        varied: tuple[int, ...] = ()
+        if last is not None and last[0] is concerned:
+            changed = np.flatnonzero(last[1] != plan).tolist()
+            if {*changed} <= {*last[2]}:  # the last values hold for this plan, too
+                _, _, varied, known = last
+                value = known.item(self._index(plan, varied))
+        if set(free) < set(varied):
+            values = known[*(slice(None) if i in free else plan[i] for i in varied)]
         else:
-            value = None if last is None else last.values.item(self._index(plan, last.free))
             self.count(agent, self.n_actions ** len(free))
             values = self._body_values(context, plan, free, value)
-        self._last = _BodyValues(concerned, plan.copy(), free, values)
+        self._last = concerned, plan.copy(), free, values
         # The plan keeps the best actions of the body; a message may then report other ones.
         best = greatest(values.ravel(), context.rng)
         plan[list(free)] = self._actions[len(free)][best]
@@ -239,13 +228,13 @@ class BestResponse(Aggregation):
         if respond is None:
             return None
         starts = self._with_starts(first, self._free[first.agent])
-        every = self._numbers[: self.n_actions**self._widest]
+        every = np.arange(self.n_actions**self._widest)
         alike = every if prediction.alike is None else prediction.alike
         n_bodies = len(self.problem.groups)
         distinct = np.count_nonzero(np.broadcast_to(alike, (n_bodies, len(every))) == every)
         self.count(first.agent, len(starts) + int(distinct) + len(every) * n_bodies)
         value = partial(self.predicted_worth, first)
-        pooled = self.learned(first).pooled
+        pooled = self.pooled(first)
         return respond(Search(pooled, starts, value, self._order, exploring, first.rng))
 
     def _plan(self, context: DecisionContext, budget: int) -> IntArray:
@@ -273,9 +262,9 @@ class BestResponse(Aggregation):
         if value is None:
             joint = _with_actions(plan, free, actions)
             return self.predicted_worth(context, joint).reshape(shape)
-        equivalent, distinct = self._distinct(free)
+        equivalent = self._equivalent_of(free)
         planned = equivalent[self._index(plan, free)]
-        predicted = distinct[distinct != planned]
+        predicted = np.setdiff1d(equivalent, planned)
         values = np.empty(len(actions))
         values[planned] = value
         if len(predicted):
@@ -283,16 +272,15 @@ class BestResponse(Aggregation):
             values[predicted] = self.predicted_worth(context, joint)
         return values[equivalent].reshape(shape)
 
-    def _distinct(self, agents: tuple[int, ...]) -> tuple[IntArray, IntArray]:
-        """Return the first equivalent action of each action of a body's agents, and distinct ones.
+    def _equivalent_of(self, agents: tuple[int, ...]) -> IntArray:
+        """Return the first equivalent action of each action of a body's agents.
 
         Equivalence is known for whole bodies, in agent order.
         """
         body = self._body_of[agents[0]]
         if agents == self.problem.groups[body]:
             return self._equivalent[body]
-        every = self._numbers[: len(self._actions[len(agents)])]
-        return every, every
+        return np.arange(self.n_actions ** len(agents))
 
     def _new_plan(self, context: DecisionContext, budget: int) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those that it plans for."""
@@ -312,7 +300,7 @@ class BestResponse(Aggregation):
             if self.problem.budget is not None and budget < 0:
                 break
             values = self._body_values(context, plan, tuple(members), value).ravel()
-            distinct = self._distinct(tuple(sorted(members)))[1]
+            distinct = np.unique(self._equivalent_of(tuple(sorted(members))))
             self.count(agent, len(distinct))
             best = distinct[greatest(values[distinct], rng)]
             plan[members] = self._actions[len(members)][best]
@@ -343,19 +331,16 @@ class BestResponse(Aggregation):
             starts.append(self._actions[2][:, (rank >= cut).astype(np.int64)])
         return np.unique(np.concatenate(starts), axis=0)
 
-    def _equivalent_actions(self, prediction: Prediction) -> list[tuple[IntArray, IntArray]]:
-        """Return, by body, the first equivalent action of each action, and the distinct ones."""
-        sizes = [len(self._actions[len(group)]) for group in self.problem.groups]
-        alike = [self._numbers] * len(sizes) if prediction.alike is None else prediction.alike
-        rows = [row[:size] for row, size in zip(alike, sizes, strict=True)]
-        return [(row, np.flatnonzero(row == self._numbers[: len(row)])) for row in rows]
+    def _equivalent_actions(self, prediction: Prediction) -> list[IntArray]:
+        """Return, by body, the first equivalent action of each action."""
+        sizes = [self.n_actions ** len(group) for group in self.problem.groups]
+        if prediction.alike is None:
+            return [np.arange(size) for size in sizes]
+        return [row[:size] for row, size in zip(prediction.alike, sizes, strict=True)]
 
     def _index(self, plan: IntArray, agents: tuple[int, ...]) -> int:
         """Return the index of the planned actions of agents among all of their joint actions."""
-        index = 0
-        for i in agents:
-            index = index * self.n_actions + int(plan[i])
-        return index
+        return int(np.ravel_multi_index(plan[list(agents)], (self.n_actions,) * len(agents)))
 
 
 def _check_common_plan(problem: DecisionProblem) -> None:

@@ -233,7 +233,6 @@ class CrossEntropy(Aggregation):
                 continue
             for k, joint in enumerate(tried):
                 onward = seen.after(joint)
-                if onward is None:
-                    raise ValueError(f"{type(seen).__name__} predicts a single decision only")
+                assert onward is not None  # see `Evaluator.continues`
                 waiting.append((onward, rows[which == k], step + 1))
         return worths

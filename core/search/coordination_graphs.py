@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 from math import isqrt
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -59,16 +59,6 @@ def order_of(graph: nx.Graph) -> tuple[tuple[int, ...], int]:
     return tuple(order), int(width)
 
 
-class _Step(NamedTuple):
-    """The elimination of one agent."""
-
-    agent: int
-    parts: tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...]
-    """Its tables: number, order of axes, and shape over the agent and its neighbors."""
-    neighbors: tuple[int, ...]
-    """Other agents of these tables: axes of the remaining table. The agent's axis was the last."""
-
-
 class Elimination:
     """Variable elimination in a fixed order.
 
@@ -102,25 +92,7 @@ class Elimination:
                 f"width {self.width} of the coordination graph takes tables of {n_actions} ** "
                 f"{1 + self.width} entries, allowed: {MAX_ENTRIES:,}; use max-plus"
             )
-        self._steps = tuple(self._plan(scopes))
-
-    def _plan(self, scopes: Sequence[Scope]) -> list[_Step]:
-        known: dict[int, Scope] = dict(enumerate(scopes))
-        steps = []
-        for agent in self.order:
-            mine = [k for k, scope in known.items() if agent in scope]
-            neighbors = tuple(sorted({a for k in mine for a in known[k]} - {agent}))
-            axes = (*neighbors, agent)
-            parts = []
-            for k in mine:
-                # Axes of the table in the common order, of length 1 for other agents.
-                shape = tuple(self.n_actions if a in known[k] else 1 for a in axes)
-                places = tuple(known[k].index(a) for a in axes if a in known[k])
-                parts.append((k, places, shape))
-                del known[k]
-            steps.append(_Step(agent, tuple(parts), neighbors))
-            known[len(scopes) + len(steps) - 1] = neighbors
-        return steps
+        self._scopes = tuple(scopes)
 
     def best(self, tables: Sequence[FloatArray]) -> IntArray:
         """Return a joint action ``(n,)`` of the greatest sum; of several, always the same one.
@@ -130,17 +102,24 @@ class Elimination:
         tables
             One for each scope, in their order; not modified.
         """
-        known = dict(enumerate(tables))
+        known = list(zip(self._scopes, tables, strict=True))
         choices = []
-        for number, step in enumerate(self._steps):
+        for agent in self.order:
+            mine = [part for part in known if agent in part[0]]
+            known = [part for part in known if agent not in part[0]]
+            neighbors = tuple(sorted({other for scope, _ in mine for other in scope} - {agent}))
+            axes = (*neighbors, agent)
             total: FloatArray = np.zeros(())
-            for k, places, shape in step.parts:
-                total = total + known.pop(k).transpose(places).reshape(shape)
-            choices.append(total.argmax(axis=-1))
-            known[len(tables) + number] = total.max(axis=-1)
-        joint = np.zeros(len(self._steps), dtype=np.int64)
-        for step, choice in zip(reversed(self._steps), reversed(choices), strict=True):
-            joint[step.agent] = choice[tuple(joint[list(step.neighbors)])]
+            for scope, table in mine:
+                # Axes of the table in the common order, of length 1 for other agents.
+                shape = [self.n_actions if i in scope else 1 for i in axes]
+                places = [scope.index(i) for i in axes if i in scope]
+                total = total + table.transpose(places).reshape(shape)
+            choices.append((agent, neighbors, total.argmax(axis=-1)))
+            known.append((neighbors, total.max(axis=-1)))
+        joint = np.zeros(len(choices), dtype=np.int64)
+        for agent, neighbors, choice in reversed(choices):
+            joint[agent] = choice[tuple(joint[list(neighbors)])]
         return joint
 
 

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from ..interface.prediction import Prediction, rewards_of, states_by_group
 from ..numerics import FloatArray, IntArray
+from ..values.rule_base import PooledWeights
 from .evaluator import (
     EVALUATORS,
     Aggregation,
@@ -19,7 +20,6 @@ from .evaluator import (
     DecisionProblem,
     Evaluator,
     EvaluatorSettings,
-    Learned,
 )
 
 MAX_JOINT_ACTIONS = 4**11
@@ -90,7 +90,7 @@ class _JointOutcomes:
         self.prediction = prediction
         self.distinct = joint_actions
         self.rows = np.arange(len(joint_actions))
-        self.values: tuple[Learned, FloatArray] | None = None
+        self.values: tuple[PooledWeights, FloatArray] | None = None
         alike = prediction.alike
         if alike is not None:
             rows = np.zeros(1, dtype=np.int64)
@@ -198,11 +198,11 @@ class ExactEnumeration(Aggregation):
 
         The mean over several agents is computed for all outcomes, once in a decision.
         """
-        learned = self.learned(context)
-        if len(learned.agents) > 1:
-            if outcomes.values is None or outcomes.values[0] is not learned:
-                values = self.mean(learned.pooled, outcomes.prediction, outcomes.distinct)
-                outcomes.values = learned, values
+        if len(self.concerned[context.agent]) > 1:
+            pooled = self.pooled(context)
+            if outcomes.values is None or outcomes.values[0] is not pooled:
+                values = self.mean(pooled, outcomes.prediction, outcomes.distinct)
+                outcomes.values = pooled, values
             return outcomes.values[1][rows]
         states = outcomes.states[context.agent]
         if len(rows) > len(states):

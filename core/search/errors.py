@@ -2,17 +2,17 @@
 
 Errors are drawn once, from the seed of the trial, and stay constant::
 
-    theta_i = theta + s * std(theta) * E_i,    c_i = c * exp(s_c * N_i)
+    theta_i = theta + s * std(theta) * E_i
 
-The standard deviation is over the consequent weights of one agent or role. E_i and N_i are standard
-normal numbers of agent i.
+The standard deviation is over the consequent weights of one agent or role. E_i are standard normal
+numbers of agent i.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..numerics import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray, stream_of
 from ..plugins.settings import NonNegative, Settings
 
 STREAM = 2**32 - 5
@@ -24,8 +24,6 @@ class ErrorSettings(Settings):
 
     weights: NonNegative = 0.0
     """Standard deviation of errors of weights, relative to that of the agent's weights."""
-    constants: NonNegative = 0.0
-    """Standard deviation of the logarithm of each constant of the predictor."""
 
 
 class Errors:
@@ -41,15 +39,13 @@ class Errors:
         By agent, the row of its weights; None if unknown.
     n_rules
         Number of rules of the rule base.
-    n_constants
-        Number of constants of the predictor.
     seed
         Seed of the team.
 
     Examples
     --------
     >>> seed = np.random.SeedSequence(1)
-    >>> errors = Errors(ErrorSettings(weights=0.5), [np.array([0])], [0], 2, 0, seed)
+    >>> errors = Errors(ErrorSettings(weights=0.5), [np.array([0])], [0], 2, seed)
     >>> theta = np.array([[1.0, 3.0]])
     >>> drawn = np.random.default_rng(np.random.SeedSequence(1, spawn_key=(STREAM, 0)))
     >>> expected = theta + 0.5 * 1.0 * drawn.standard_normal((1, 2))
@@ -63,26 +59,17 @@ class Errors:
         concerned: list[IntArray],
         rows: list[int | None],
         n_rules: int,
-        n_constants: int,
         seed: np.random.SeedSequence,
     ) -> None:
-        if settings.constants and not n_constants:
-            raise ValueError(
-                f"learner.decision.errors.constants = {settings.constants}: the scenario's "
-                "predictor has no constants, use 0"
-            )
         self._settings = settings
         self._rows: list[IntArray] = []
         self._weights: list[FloatArray] = []
-        self._constants: list[FloatArray] = []
         for agent, averaged in enumerate(concerned):
-            child = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, STREAM, agent))
-            rng = np.random.default_rng(child)
+            rng = stream_of(seed, STREAM, agent)
             known = {row for other in averaged.tolist() if (row := rows[other]) is not None}
             self._rows.append(np.array(sorted(known), dtype=np.int64))
             size = len(known) if settings.weights else 0
             self._weights.append(rng.standard_normal((size, n_rules)))
-            self._constants.append(settings.constants * rng.standard_normal(n_constants))
 
     def weights(self, agent: int, theta: FloatArray) -> FloatArray:
         """Return the weights `theta` ``(n_rows, n_rules)`` with the errors of an agent."""
@@ -93,7 +80,3 @@ class Errors:
         taken = theta.copy()
         taken[rows] += scale * self._weights[agent]
         return taken
-
-    def constants(self, agent: int) -> FloatArray | None:
-        """Return an agent's errors ``(c,)`` of the logarithms of constants, or None."""
-        return self._constants[agent] if self._settings.constants else None

@@ -9,7 +9,6 @@ therefore costs little more than the value of a few.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -178,41 +177,6 @@ def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
     return [np.array(sorted((i, *below[i]))) for i in every]
 
 
-class Learned:
-    """Consequent weights of some agents during one decision; derived arrays are computed once.
-
-    Parameters
-    ----------
-    weights
-        The consequent weights ``(n_rules,)`` of every agent, in agent order.
-    agents
-        ``(k,)`` the agents, in agent order.
-    body_of
-        ``(n,)`` the body of every agent.
-    """
-
-    def __init__(self, weights: Sequence[FloatArray], agents: IntArray, body_of: IntArray) -> None:
-        self.weights = weights
-        self.agents = agents
-        self._body_of = body_of
-
-    @cached_property
-    def is_zero(self) -> bool:
-        """Whether all their weights are zero."""
-        each = (self.weights[i] for i in self.agents.tolist())
-        return not any(own[:64].any() or own.any() for own in each)
-
-    @cached_property
-    def pooled(self) -> PooledWeights:
-        """Weights of the agents, summed over agents with the same variables."""
-        theta = np.array([self.weights[i] for i in self.agents], dtype=float)
-        bodies, firsts = np.unique(self._body_of[self.agents], return_index=True)
-        summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
-        return PooledWeights(
-            (theta, *summed), self.agents, bodies, np.append(firsts, len(self.agents))
-        )
-
-
 class Aggregation(Evaluator):
     """Base class of evaluators: the decision rule and the aggregation over teammates.
 
@@ -245,7 +209,8 @@ class Aggregation(Evaluator):
         self.concerned = concerned(self.hierarchy, problem.value_of)
         """By agent, ``(k,)`` the agents whose values it averages."""
         self._body_of = np.array([g for g, group in enumerate(problem.groups) for _ in group])
-        self._learned: Learned | None = None
+        self._weights: Sequence[FloatArray] = ()
+        self._pooled: PooledWeights | None = None
         self._have_learned: set[int] = set()
 
     @staticmethod
@@ -305,17 +270,21 @@ class Aggregation(Evaluator):
         agent = context.agent
         if self.problem.rule != "value" or agent in self._have_learned:
             return False
-        if self.learned(context).is_zero:
-            return True
-        self._have_learned.add(agent)
-        return False
+        if any(context.weights[i].any() for i in self.concerned[agent].tolist()):
+            self._have_learned.add(agent)
+        return agent not in self._have_learned
 
-    def learned(self, context: DecisionContext) -> Learned:
-        """Return the weights of the averaged agents, the same object within a decision."""
-        weights, concerned = context.weights, self.concerned[context.agent]
-        last = self._learned
-        if last is None or last.weights is not weights or last.agents is not concerned:
-            last = self._learned = Learned(weights, concerned, self._body_of)
+    def pooled(self, context: DecisionContext) -> PooledWeights:
+        """Return the summed weights of the averaged agents, the same object within a decision."""
+        agents = self.concerned[context.agent]
+        last = self._pooled
+        if last is None or last.agents is not agents or self._weights is not context.weights:
+            theta = np.array([context.weights[i] for i in agents], dtype=float)
+            bodies, firsts = np.unique(self._body_of[agents], return_index=True)
+            summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
+            last = PooledWeights((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
+            self._pooled = last
+            self._weights = context.weights
         return last
 
     def worth(self, context: DecisionContext, joint_actions: IntArray) -> FloatArray:
@@ -330,7 +299,7 @@ class Aggregation(Evaluator):
 
         def values() -> FloatArray:
             if len(concerned) > 1:
-                return self.mean(self.learned(context).pooled, prediction, joint_actions)
+                return self.mean(self.pooled(context), prediction, joint_actions)
             states = prediction.states(context.agent, joint_actions)
             return self.rules.values(context.own_weights, states)
 

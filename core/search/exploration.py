@@ -9,7 +9,7 @@ the same state).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -90,7 +90,7 @@ class BoltzmannExploration(ExplorationSettings):
 class Boltzmann(Explorer):
     """Samples the Boltzmann distribution. The clock counts the steps of the whole run."""
 
-    def __init__(self, settings: BoltzmannExploration | PaperExploration, n_agents: int) -> None:
+    def __init__(self, settings: Any, n_agents: int) -> None:
         self.settings = settings
         self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
 
@@ -139,27 +139,23 @@ class PaperExploration(ExplorationSettings):
 class EpsilonDecreasingBoltzmann(Boltzmann):
     """The paper's epsilon-decreasing exploration with a diminishing temperature (Section V)."""
 
-    def __init__(self, settings: PaperExploration, n_agents: int) -> None:
-        super().__init__(settings, n_agents)
-        self.paper = settings
-
     @property
     def rate(self) -> float:
         """Exploration probability epsilon (T(t) - 1) / (T_max - 1), at most 1."""
-        s = self.paper
+        s = self.settings
         return min(1.0, s.epsilon * (self.temperature - 1.0) / (s.max_temperature - 1.0))
 
     def begin_episode(self) -> None:
         """Restart the clock if it counts the steps of the episode."""
-        if self.paper.clock == "episode":
+        if self.settings.clock == "episode":
             self.memory[0] = 0.0
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Exploit with probability 1 - rate, otherwise explore."""
         if rng.random() < self.rate:
-            if self.paper.explore == "uniform":
+            if self.settings.explore == "uniform":
                 return int(rng.integers(len(values)))
-        elif self.paper.exploit == "greatest":
+        elif self.settings.exploit == "greatest":
             # Eq. 14 is increasing in the value: the greatest probability is the greatest value.
             return greatest(values, rng)
         return super().choose(agent, values, rng)
@@ -197,7 +193,6 @@ class Bursts(Explorer):
         # The episode; then, by agent, the remaining decisions of its burst and the held action.
         self.memory: FloatArray = np.zeros(1 + 2 * n_agents)
         self.memory[0] = -1.0
-        self._of_episode = (np.nan, 0.0, 0.0)
 
     @property
     def rate(self) -> float:
@@ -212,12 +207,8 @@ class Bursts(Explorer):
         If bursts of mean length l begin with probability p, the share l p / (1 - p + l p) of all
         decisions is explorative. This is solved for p.
         """
-        episode = float(self.memory[0])
-        if self._of_episode[0] != episode:
-            length = self.settings.length
-            rate = self.rate
-            self._of_episode = episode, rate / (length - rate * (length - 1.0)), 1.0 / length
-        return Exploring(self.memory, *self._of_episode[1:])
+        rate, length = self.rate, self.settings.length
+        return Exploring(self.memory, rate / (length - rate * (length - 1.0)), 1.0 / length)
 
     def begin_episode(self) -> None:
         """Count the episode and end all bursts."""

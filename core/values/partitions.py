@@ -66,12 +66,12 @@ class Partition:
                 f"partition: membership = {self.membership!r}, allowed: "
                 f"{', '.join(get_args(Membership))}"
             )
-        if len(self.centers) < 2:
-            raise ValueError(f"partition: centers = {self.centers}, at least two are needed")
-        if not all(map(isfinite, self.centers)):
-            raise ValueError(f"partition: centers = {self.centers}, all must be finite")
-        if any(a >= b for a, b in zip(self.centers, self.centers[1:], strict=False)):
-            raise ValueError(f"partition: centers {self.centers} must increase")
+        is_finite = all(map(isfinite, self.centers))
+        if len(self.centers) < 2 or not (is_finite and np.all(np.diff(self.centers) > 0.0)):
+            raise ValueError(
+                f"partition: centers = {self.centers}, allowed: two or more finite numbers that "
+                "increase"
+            )
         if not 0.0 <= self.period < inf:
             raise ValueError(f"partition: period = {self.period}, allowed: 0 or a positive number")
         if not 0.0 < self.steepness < inf:

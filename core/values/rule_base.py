@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import accumulate, combinations
+from itertools import combinations
 from math import prod
 from typing import Annotated, Literal, NamedTuple
 
@@ -48,10 +48,6 @@ class RuleBaseSettings(Settings):
     """Number of variables per rule. 1 is a sum of functions of one variable; ``full``, or the
     number of variables, is the paper's product of all. Use 2 if the effect of one variable depends
     on another; learning then takes more episodes."""
-    products: tuple[tuple[str, ...], ...] = ()
-    """Further products of variables, by name, in addition to those of `order`."""
-    precision: Literal["float64", "float32"] = "float64"
-    """Precision of consequent weights and traces; float32 halves memory."""
 
 
 MAX_RULES = 2**63 - 1
@@ -84,8 +80,6 @@ class RuleBase:
     n_own
         Number of leading variables that are an agent's own (see
         `nested_agents.core.interface.spaces`).
-    dtype
-        Type of the consequent weights of learners. States are always double precision.
     common
         Indices of variables that are the same for all agents.
     actions
@@ -108,7 +102,6 @@ class RuleBase:
         partitions: Sequence[Partition],
         terms: Sequence[tuple[int, ...]],
         n_own: int = 0,
-        dtype: str = "float64",
         common: Sequence[int] = (),
         actions: Sequence[int] = (),
         names: Sequence[str] = (),
@@ -133,7 +126,6 @@ class RuleBase:
         self.n_rules = sum(self.sizes)
         if self.n_rules > MAX_RULES:
             raise ValueError(f"rule base: {self.n_rules} rules, allowed {MAX_RULES} at most")
-        self.dtype = np.dtype(dtype)
         self.is_triangular = self.partitions[0].membership == "triangular"
         self.layout = layout(self.partitions, self.terms)
 
@@ -144,8 +136,7 @@ class RuleBase:
         Raises
         ------
         ValueError
-            If the order exceeds the number of variables, or a product is empty or names a variable
-            that is unknown or repeated.
+            If the order exceeds the number of variables.
         """
         names = [v.name for v in space.variables]
         order = len(names) if settings.order == "full" else settings.order
@@ -154,20 +145,6 @@ class RuleBase:
                 f"learner.rule_base.order = {order}, allowed 1 to {len(names)} in state "
                 f"space {space.name!r}"
             )
-        terms = list(combinations(range(len(names)), order))
-        for product in settings.products:
-            unknown = [name for name in product if name not in names]
-            if unknown:
-                raise ValueError(
-                    f"learner.rule_base.products: unknown variable {unknown[0]!r}, known: "
-                    f"{', '.join(names)}"
-                )
-            if not product or len(set(product)) < len(product):
-                raise ValueError(
-                    f"learner.rule_base.products: {list(product)} must name at least one variable, "
-                    "each once"
-                )
-            terms.append(tuple(sorted(names.index(name) for name in product)))
         counts = dict.fromkeys(names, settings.memberships) | dict.fromkeys(space.actions)
         partitions = {
             v.name: Partition.of(v, settings.membership, counts[v.name], settings.steepness)
@@ -183,9 +160,8 @@ class RuleBase:
                 raise ValueError(f"learner.rule_base.centers.{name}: {error}") from None
         return cls(
             list(partitions.values()),
-            list(dict.fromkeys(terms)),
+            list(combinations(range(len(names)), order)),
             space.n_own,
-            settings.precision,
             [names.index(name) for name in space.common],
             [names.index(name) for name in space.actions],
             names,
@@ -304,17 +280,13 @@ class RuleBase:
         """
         strengths = self._strengths(states)
         values: FloatArray = np.zeros(len(states))
-        for term, weights in zip(self.terms, self._split(theta), strict=True):
+        blocks = np.split(theta, np.cumsum(self.sizes)[:-1])
+        for term, weights in zip(self.terms, blocks, strict=True):
             half = len(term) // 2
             heads = _products([strengths[j] for j in term[:half]], len(states))
             tails = _products([strengths[j] for j in term[half:]], len(states))
             values += ((heads @ weights.reshape(heads.shape[1], -1)) * tails).sum(axis=1)
         return values
-
-    def _split(self, theta: FloatArray) -> list[FloatArray]:
-        """Return the weights ``(n_rules,)`` by term."""
-        ends = list(accumulate(self.sizes))
-        return [theta[end - size : end] for end, size in zip(ends, self.sizes, strict=True)]
 
     def _strengths(self, states: FloatArray) -> list[FloatArray]:
         """Return the membership degrees of states ``(m, d)`` by variable."""

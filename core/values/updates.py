@@ -46,16 +46,15 @@ def td_lambda_update(
     rules, strengths = active
     next_rules, next_strengths = active_next
     discount, step_sizes, decay = constants
-    typed_decay = theta.dtype.type(decay)
     for i in range(len(rows)):
         weights = theta[rows[i]]
         trace = traces[i]
         value = _value(weights, rules[i], strengths[i])
         next_value = _value(weights, next_rules[i], next_strengths[i])
         error = rewards[i] + discount * next_value - value
-        step = theta.dtype.type(step_sizes[i] * error)
+        step = step_sizes[i] * error
         for k in range(len(trace)):
-            decayed = typed_decay * trace[k]
+            decayed = decay * trace[k]
             trace[k] = decayed if abs(decayed) > MIN_TRACE else 0.0
         for a in range(rules.shape[1]):
             trace[rules[i, a]] += strengths[i, a]

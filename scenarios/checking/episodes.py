@@ -91,8 +91,8 @@ def start(scenario: Scenario, seed: int, episode: int) -> StepRecord:
 
 def transition_fields(transition: Transition) -> Iterator[tuple[str, object]]:
     """Yield the values of a transition by dotted name, not copied."""
-    names = ("states", "reward", "terminated", "truncated", "twists", "info")
-    return _flat({name: getattr(transition, name) for name in names})
+    fields = dict(vars(transition), twists=transition.measured_twists())
+    return _flat({name: value for name, value in fields.items() if name != "absorbing"})
 
 
 def ask_for_predictions(scenario: Scenario) -> None:

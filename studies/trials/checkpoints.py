@@ -47,8 +47,6 @@ class CheckpointState(NamedTuple):
     """Recordings as in `TrialResult`."""
     team: Recording
     """State of the team."""
-    environments: Recording
-    """State of parallel environments; empty for a learner with one environment."""
 
 
 class Checkpoint:
@@ -77,7 +75,7 @@ class Checkpoint:
             "training_cpu_s": state.training_cpu_s,
         }
         groups = {f"recordings/{name}": arrays for name, arrays in state.recordings.items()}
-        groups |= {"team": state.team, "environments": state.environments}
+        groups["team"] = state.team
         arrays = {
             f"{group}/{k}": array for group, own in groups.items() for k, array in own.items()
         }
@@ -111,7 +109,6 @@ class Checkpoint:
                 training_cpu_s=float(table["training_cpu_s"]),
                 recordings={name: select_prefix(f"recordings/{name}/", arrays) for name in names},
                 team=select_prefix("team/", arrays),
-                environments=select_prefix("environments/", arrays),
             )
         except (OSError, ValueError, KeyError, TypeError, EOFError):
             return None

@@ -117,8 +117,6 @@ class Session:
 
     def _load_state(self, state: CheckpointState) -> None:
         self.team.load_state_dict(state.team)
-        if state.environments:
-            self._parallel_loop.load_state_dict(state.environments)
         self._rows = list(state.rows)
         self.training_cpu_s = state.training_cpu_s
         self._decisions = sum(row.steps for row in self._training_rows)
@@ -128,10 +126,13 @@ class Session:
         self._stages = ()
 
     def save_checkpoint(self) -> None:
-        """Write a checkpoint if it is due. Call it between episodes."""
-        if self._checkpoint is None or not self._checkpoint.is_due:
-            return
+        """Write a checkpoint if it is due. Call it between episodes.
+
+        A trial with several environments has none, because it trains in the middle of episodes.
+        """
         is_parallel = self.trial.settings.learner.n_environments > 1
+        if is_parallel or self._checkpoint is None or not self._checkpoint.is_due:
+            return
         self._checkpoint.write(
             CheckpointState(
                 self._rows,
@@ -140,7 +141,6 @@ class Session:
                 self.training_cpu_s,
                 self._recordings,
                 self.team.state_dict(),
-                self._parallel_loop.state_dict() if is_parallel else {},
             )
         )
 
@@ -227,22 +227,19 @@ class Session:
         settings = self.trial.settings
         count = settings.learner.n_environments
         environments = make_environments(lambda: arrange(settings, 0).scenario, count)
-        return ManyEnvironmentsLoop(
-            environments, self.scenario, self.team, self.trial.steps, self.trial.seed
-        )
+        return ManyEnvironmentsLoop(environments, self.team, self.trial.steps, self.trial.seed)
 
     def _train_in_parallel(self, decisions: int, start_cpu_s: float) -> None:
         start = working_seconds()
         rates = [m.name for m in self._measures if m.source == "terminated"]
         done = self.trained
         while self._parallel_loop.decisions < decisions:
-            for ended in self._parallel_loop.step():
-                measured = dict.fromkeys(rates, ended.terminated)
-                row = EpisodeRow("training", done, ended.steps, measured, ended.return_)
+            for steps, return_, terminated in self._parallel_loop.step():
+                measured = dict.fromkeys(rates, terminated)
+                row = EpisodeRow("training", done, steps, measured, return_)
                 self._rows.append(row)
                 done += 1
             self.training_cpu_s = process_time() - start_cpu_s
-            self.save_checkpoint()
         self._watch.seconds["learning"] += working_seconds() - start
 
     def _record(self, record: StepRecord) -> None:

@@ -2,7 +2,6 @@
 
 from fractions import Fraction
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -77,23 +76,3 @@ def test_any_hierarchy() -> None:
 
 def test_an_independent_agent_costs_the_same_alone_and_in_company() -> None:
     assert PAPER.nested([0] * 7) == 7 * PAPER.nested([0])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"rules": 0}, "rules = 0, allowed: 1 or more"),
-        ({"actions": 1}, "actions = 1, allowed: 2 or more"),
-        ({"iterations": 0}, "iterations = 0, allowed: 1 or more"),
-    ],
-)
-def test_impossible_quantities_are_refused(arguments: dict[str, int], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Problem(**arguments)
-
-
-@pytest.mark.parametrize("n", [0, -1])
-@pytest.mark.parametrize("formula", ["chain_closed_form", "chain_asymptotic", "single_agent"])
-def test_fewer_agents_than_one_are_refused(formula: str, n: int) -> None:
-    with pytest.raises(ValueError, match=f"n = {n}, allowed: 1 or more"):
-        getattr(PAPER, formula)(n)

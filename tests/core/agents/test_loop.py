@@ -168,7 +168,7 @@ def test_evaluation_leaves_what_was_learned_alone(settings, world) -> None:
 def test_a_team_learns_to_push(line_world) -> None:
     # The load starts up to 1.5 m from the goal and moves at most 0.1 m a step.
     settings = BatchTDSettings(
-        rule_base=RuleBaseSettings(products=(("speed", "gap"),)),
+        rule_base=RuleBaseSettings(order=2),
         ridge=0.1,
         target_averaging_rate=1.0,
         discount=0.9,

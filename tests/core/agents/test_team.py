@@ -16,7 +16,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.failures import AbsentAgents, LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.interface.experience import Experience
-from nested_agents.core.interface.scenario import Members, carried_rows
+from nested_agents.core.interface.scenario import carried_rows, owners_of
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
 from nested_agents.core.learners.learner import Learner
@@ -386,9 +386,9 @@ def test_weights_are_not_carried_where_they_mean_nothing(
         other.state_space = StateSpace("short", other.state_space.variables[:1])
     if "action_set" in change:
         other.action_set = ActionSet(("go", "stay"), (1.0, 1.0), (1.0, 0.0), 1)
-    former, successor = (Members(w, np.arange(len(w.agents))) for w in (world, other))
+    owners, others = (owners_of(w, np.arange(len(w.agents)), shared=shared) for w in (world, other))
     with pytest.raises(ValueError, match=said) as caught:
-        carried_rows(former, successor, shared=shared)
+        carried_rows(world, other, owners, others, shared=shared)
     assert "\n" not in str(caught.value)
 
 

@@ -37,13 +37,13 @@ def world(line_world):
 def test_errors_are_of_the_size_that_is_said_and_stay() -> None:
     theta = np.random.default_rng(0).standard_normal((2, 5000)) * [[1.0], [10.0]]
     every = [np.array([0]), np.array([0, 1])]
-    errors = Errors(ErrorSettings(weights=0.3), every, [0, 1], 5000, 0, SEED)
+    errors = Errors(ErrorSettings(weights=0.3), every, [0, 1], 5000, SEED)
     off = errors.weights(1, theta) - theta
     np.testing.assert_allclose(off.std(axis=1) / theta.std(axis=1), 0.3, rtol=0.05)
     np.testing.assert_array_equal(errors.weights(1, theta) - theta, off)
     np.testing.assert_array_equal(errors.weights(0, theta)[1], theta[1])  # not its concern
     assert (errors.weights(0, theta)[0] != errors.weights(1, theta)[0]).any()
-    half = Errors(ErrorSettings(weights=0.15), every, [0, 1], 5000, 0, SEED)
+    half = Errors(ErrorSettings(weights=0.15), every, [0, 1], 5000, SEED)
     np.testing.assert_allclose(half.weights(1, theta) - theta, off / 2)
 
 
@@ -97,14 +97,7 @@ def test_agents_without_errors_that_tell_expect_what_is_done(world) -> None:
     assert team.decision_costs["agreement"] >= 2 / 3
 
 
-@pytest.mark.parametrize(
-    ("decision", "problem"),
-    [
-        ({"errors": ErrorSettings(constants=0.1)}, "learner.decision.errors.constants = 0.1: "),
-        ({"errors": ErrorSettings(), "plan": "common"}, "so their plans differ"),
-    ],
-)
-def test_what_cannot_be_is_refused_in_one_line(world, decision, problem: str) -> None:
-    with pytest.raises(ValueError, match=problem) as error:
-        team_of(world, **decision)
+def test_a_common_plan_of_agents_that_differ_is_refused(world) -> None:
+    with pytest.raises(ValueError, match="so their plans differ") as error:
+        team_of(world, errors=ErrorSettings(), plan="common")
     assert "\n" not in str(error.value)

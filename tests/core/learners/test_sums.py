@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.td import (
+from nested_agents.core.learners.sums import (
     SparseCooperative,
     SparseCooperativeSettings,
     ValueDecomposition,

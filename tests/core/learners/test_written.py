@@ -32,7 +32,7 @@ def written(value=VALUE, **rules) -> Written:
 def test_the_value_is_the_formula() -> None:
     learner = written()
     states = np.array([[0.0, 0.0], [0.25, 1.25], [1.7, -1.0], [3.0, 0.0]])
-    values = learner.rules.values(learner.theta[0], states)
+    values = RuleBase.build(SPACE, RuleBaseSettings()).values(learner.theta[0], states)
     by_hand = [0.0, -0.25 - 0.125, -1.7 - 0.1, -2.0]  # beyond the outermost center it stays
     np.testing.assert_allclose(values, by_hand)
     assert learner.theta.shape == (2, 8)

@@ -17,8 +17,7 @@ from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.models.learned_predictor import LearnedPredictor
 from nested_agents.core.models.predictors import (
     LearnedPredictorSettings,
-    Persistence,
-    StaticPredictor,
+    StaticPrediction,
 )
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
@@ -138,8 +137,8 @@ def test_what_moves_what_is_taken_from_the_middle_of_the_way() -> None:
 def test_before_any_experience_nothing_changes() -> None:
     states = np.array([[0.5, 4.0, 0.2], [0.0, 1.0, 0.2]])
     joint = np.array([[0, 1], [2, 3]])
-    for predictor in (LearnedPredictor(LEARNED, Rails()), Persistence(StaticPredictor(), Rails())):
-        prediction = predictor.predict(states)
+    learned = LearnedPredictor(LEARNED, Rails())
+    for prediction in (learned.predict(states), StaticPrediction(states)):
         for agent in range(2):
             assert prediction.states(agent, joint) == pytest.approx(states[[agent] * 2])
 

@@ -153,7 +153,7 @@ def test_permuting_agents_permutes_results() -> None:
     second.agents = tuple(names[i] for i in order)
     _, one = team_of(first, Hierarchy(first.agents, edges), critic="own")
     team, other = team_of(second, Hierarchy(second.agents, edges), critic="own")
-    rows = [one.input_names.actor.index(name) for name in other.input_names.actor]
+    rows = [one.input_names[0].index(name) for name in other.input_names[0]]
     other.policies["all"].actor.warm_start(one.policies["all"].actor, rows)
     states = first.reset(4)
     noise = np.random.default_rng(0).gumbel(size=(CARTS, len(first.action_set)))

@@ -51,31 +51,11 @@ def team_of(kind="hierarchy-ppo", table=SPREAD, seed=0, failures=(), **changes):
 def loop_of(team, table=SPREAD, most=1000):
     count = SMALL["environments"]
     many = make_environments(lambda: build(table), count)
-    return ManyEnvironmentsLoop(many, build(table), team, most, 0)
+    return ManyEnvironmentsLoop(many, team, most, 0)
 
 
 def weights(team):
     return np.concatenate([policy.weights for policy in team.parts[0].policies.values()])
-
-
-@pytest.mark.parametrize("extra", [{}, {"normalized": "values", "learning_rate_decisions": 200}])
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_saved_team_continues_to_the_same_bits(kind, extra):
-    table = {"kind": "spread", "most_decisions": 7}
-    straight, broken = team_of(kind, **extra), team_of(kind, **extra)
-    loops = [loop_of(straight, table), loop_of(broken, table)]
-    for _ in range(13):
-        for loop in loops:
-            loop.step()
-    resumed = team_of(kind, seed=5, **extra)
-    resumed.load_state_dict({name: a.copy() for name, a in broken.state_dict().items()})
-    loop = loop_of(resumed, table)
-    loop.load_state_dict(loops[1].state_dict())
-    for _ in range(13):
-        loops[0].step()
-        loop.step()
-    assert np.array_equal(weights(straight), weights(resumed))
-    assert np.array_equal(loops[0]._states, loop._states)
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -126,7 +106,7 @@ def test_agents_see_what_they_are_told():
 
 @pytest.mark.parametrize("weights", ["all", "own"])
 def test_the_reward_of_the_team_is_the_mean_of_all_agents(weights):
-    team = team_of(weights=weights, normalized="values")
+    team = team_of(weights=weights)
     loop = loop_of(team)
     rewards = []
     step = loop._environments.step
@@ -134,10 +114,9 @@ def test_the_reward_of_the_team_is_the_mean_of_all_agents(weights):
     loop.step()
     assert np.ptp(rewards[0].rewards, axis=1).any()
     for policy in team.parts[0].policies.values():
-        expected = np.broadcast_to(
-            rewards[0].rewards.mean(axis=1)[:, None], policy.rollout.rewards[0].shape
-        )
-        assert policy.rollout.rewards[0] == pytest.approx(expected, rel=1e-6)
+        expected = np.clip(rewards[0].rewards.mean(axis=1) / policy._moments.deviation, -10, 10)
+        for of_agent in policy.rollout.rewards[0].T:
+            assert of_agent == pytest.approx(expected, rel=1e-6)
 
 
 def test_messages_that_fail_are_refused():

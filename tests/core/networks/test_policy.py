@@ -119,13 +119,14 @@ def test_rewards_are_divided_by_the_deviation_of_discounted_returns():
 
 
 def test_a_truncated_episode_continues_by_its_value():
-    policy = policy_of(normalized="values", discount=0.5)
+    policy = policy_of(discount=0.5)
     append(policy, np.array([1.0, 2.0]), True)
+    rewards = policy.rollout.rewards[0, 0].copy()
     own, joint = np.ones((1, 2, 4), np.float32), np.ones((1, 3), np.float32)
     policy.bootstrap(np.array([True]), own, joint)
     value = policy.values(own, joint)[0]
     assert value.all()
-    assert policy.rollout.rewards[0, 0] == pytest.approx([1.0, 2.0] + 0.5 * value)
+    assert policy.rollout.rewards[0, 0] == pytest.approx(rewards + 0.5 * value)
 
 
 def test_decay():

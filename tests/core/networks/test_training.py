@@ -26,7 +26,6 @@ KINDS: dict[str, dict[str, Any]] = {
     "mappo": {"kind": "mappo", **PPO},
     "hierarchy-ppo": {"kind": "hierarchy-ppo", **PPO},
     "own weights": {"kind": "hierarchy-ppo", "weights": "own", **PPO},
-    "values": {"kind": "hierarchy-ppo", "normalized": "values", **PPO},
 }
 MIXED = [
     {"agents": "cart1", "learner": KINDS["ippo"]},
@@ -178,8 +177,8 @@ def test_weights_go_on_with_the_names_of_inputs(critic: str) -> None:
         there = arrange(spec.conditions()[0].settings, 0)
         agents: Any = there.team.parts[0]
         agents.warm_start(former)
-        before = dict(zip(former.input_names.actor, weights_into(former), strict=True))
-        after = dict(zip(agents.input_names.actor, weights_into(agents), strict=True))
+        before = dict(zip(former.input_names[0], weights_into(former), strict=True))
+        after = dict(zip(agents.input_names[0], weights_into(agents), strict=True))
         for input_, column in after.items():
             assert (column == before.get(input_, 0.0)).all(), (name, input_)
         assert {*after} - {*before}, "some inputs are new"

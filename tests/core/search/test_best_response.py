@@ -19,12 +19,11 @@ from nested_agents.core.search.enumeration import (
 from nested_agents.core.search.evaluator import (
     DecisionContext,
     DecisionProblem,
-    Learned,
     Rule,
     ValueOf,
     concerned,
 )
-from nested_agents.core.values.rule_base import RuleBase, RuleBaseSettings
+from nested_agents.core.values.rule_base import PooledWeights, RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2
@@ -55,7 +54,7 @@ def world(line_world):
 
 @pytest.fixture
 def rules(world) -> RuleBase:
-    return RuleBase.build(world.state_space, RuleBaseSettings(products=(("speed", "gap"),)))
+    return RuleBase.build(world.state_space, RuleBaseSettings(order=2))
 
 
 def asked(agent, world, theta, hierarchy, rng) -> DecisionContext:
@@ -183,9 +182,26 @@ def test_pooled_means_are_means(order: int, membership: str) -> None:
     problem = DecisionProblem(rules, hierarchy, A, groups, "value", "best-response", 0.9)
     pooling = BestResponse(problem)
     expected = np.mean([rules.values(theta[i], states[i]) for i in agents], axis=0)
-    pooled = Learned(list(theta), agents, np.repeat(range(3), 2)).pooled
+    of_bodies = np.stack([theta[1], theta[2] + theta[3], theta[5]])
+    weights = theta[agents], of_bodies, theta[agents].sum(axis=0)[None]
+    pooled = PooledWeights(weights, agents, np.arange(3), np.array([0, 1, 3, 4]))
     found = pooling.mean(pooled, Remembered(states), np.zeros((7, 6), dtype=int))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def test_neighbors_in_one_body_both_try_the_actions_of_their_body(world, rules) -> None:
+    first, second, *_ = world.agents
+    hierarchy = Hierarchy(world.agents, [], neighbors=[(first, second)])
+    fields = (rules, hierarchy, A, world.groups, "value", "best-response", 0.9, "team")
+    search = BestResponse(DecisionProblem(*fields, plan="common"))
+    rng, prediction = np.random.default_rng(4), world.predict()
+    theta, joint = rng.normal(size=(4, rules.n_rules)), np.full(4, NEUTRAL)
+    tried = []
+    for agent in (0, 1):
+        context = DecisionContext(agent, joint, prediction, theta, np.full((4, A), 1 / A), rng)
+        search.values(context)
+        tried.append(search.counts.joint_actions)
+    assert tried[1] - tried[0] == A**2
 
 
 def test_auto_takes_best_responses_where_values_of_others_decide(world, rules) -> None:

@@ -8,7 +8,7 @@ from acting import fuzzy, joint_of
 
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.learners.td import SparseCooperativeSettings
+from nested_agents.core.learners.sums import SparseCooperativeSettings
 from nested_agents.core.search.settings import DecisionSettings
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.topologies import build, parse

@@ -108,7 +108,7 @@ def world(line_world):
 
 @pytest.fixture(params=["triangular", "sigmoid"])
 def rules(request: pytest.FixtureRequest, world) -> RuleBase:
-    settings = RuleBaseSettings(membership=request.param, products=(("speed", "gap"),))
+    settings = RuleBaseSettings(membership=request.param, order=2)
     return RuleBase.build(world.state_space, settings)
 
 

@@ -51,21 +51,6 @@ def chain_of_six(world, evaluator: str, value_of: str) -> Team:
     return Team(settings, world, hierarchy, np.random.SeedSequence(1))
 
 
-# Each agent's own; those of all after it, too, 6 + 5 + ... + 1; those of all, for all at once.
-LOOKS = {"own": 6, "below": 21, "team": 6}
-
-
-@pytest.mark.parametrize("evaluator", ["exact", "sampling", "best-response"])
-@pytest.mark.parametrize("value_of", LOOKS)
-def test_nothing_learned_is_asked_once(evaluator, value_of, line_world, watched) -> None:
-    world = line_world(carts=3, wheels=2)
-    world.reset(3)
-    team = chain_of_six(world, evaluator, value_of)
-    for _ in range(2):
-        team.act(look(world, world.present()))
-    assert [len(weights.looked_at) for weights in watched] == [LOOKS[value_of]] * 2
-
-
 @pytest.mark.parametrize("evaluator", ["exact", "sampling", "best-response"])
 def test_what_has_been_learned_is_pooled_once(evaluator, line_world, watched) -> None:
     world = line_world(carts=3, wheels=2)

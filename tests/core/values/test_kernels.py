@@ -137,23 +137,6 @@ def test_summed_values(
     assert base.summed_values(pooled, own, shared) == pytest.approx(expected, rel=0, abs=1e-11)
 
 
-def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
-    theta, trace = rng.normal(size=(2, 3, base.n_rules)).astype(np.float32)
-    states, rewards = states_of(rng, 3), rng.normal(size=3)
-    wide = theta.astype(float), trace.astype(float)
-    scale = float(np.abs(theta).max())
-    found = base.values_of_agents(theta, states[:, None])[:, 0]
-    expected = np.einsum("ij,ij->i", base.features(states), wide[0])
-    assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
-    steps = 0.1 * (rewards - np.einsum("ij,ij->i", base.features(states), wide[0]))
-    constants = 0.0, np.full(3, 0.1), 0.38
-    td_update(base, theta, ROWS, trace, states, states, rewards, constants)
-    oracle.td_update(base, *wide, states, steps, 0.38)
-    assert theta.dtype == trace.dtype == np.float32
-    assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
-    assert theta == pytest.approx(wide[0], rel=1e-5, abs=1e-5)
-
-
 def test_a_states_array_in_any_memory_order(base: RuleBase, rng: np.random.Generator) -> None:
     theta, states = rng.normal(size=base.n_rules), states_of(rng, 12)
     assert (base.values(theta, np.asfortranarray(states)) == base.values(theta, states)).all()

@@ -63,17 +63,6 @@ def test_the_two_rule_bases_of_the_paper_have_35_and_78125_rules() -> None:
         assert RuleBase.build(space_of(7), RuleBaseSettings(order=order)).n_rules == n_rules
 
 
-def test_products_are_added_once_and_in_any_spelling() -> None:
-    settings = RuleBaseSettings(
-        memberships=2, products=(("x2", "x0"), ("x0", "x2"), ("x1",), ("x0", "x1", "x2"))
-    )
-    base = RuleBase.build(space_of(3), settings)
-    assert base.terms == ((0,), (1,), (2,), (0, 2), (0, 1, 2))
-    assert base.n_rules == 3 * 2 + 4 + 8
-    state = np.array([[0.2, 0.5, 0.75]])
-    assert base.features(state)[0, 6:10] == pytest.approx([0.2, 0.6, 0.05, 0.15], abs=1e-15)
-
-
 def test_centers_by_variable() -> None:
     settings = RuleBaseSettings(memberships=4, centers={"x1": (-2.0, 0.5, 3.0)})
     base = RuleBase.build(space_of(2), settings)
@@ -101,12 +90,12 @@ def test_a_variables_own_centers_may_differ_in_number() -> None:
 
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
 def test_active_rules_are_the_features_that_count(membership: str) -> None:
-    settings = RuleBaseSettings(membership=membership, memberships=4, products=(("x0", "x2"),))
+    settings = RuleBaseSettings(membership=membership, memberships=4, order=2)
     base = RuleBase.build(space_of(3), settings)
     states = np.random.default_rng(2).uniform(-0.2, 1.2, (20, 3))
     rules, strengths = base.active(states)
     assert rules.shape == strengths.shape
-    assert rules.shape[1] == (3 * 2 + 4 if membership == "triangular" else base.n_rules)
+    assert rules.shape[1] == (3 * 4 if membership == "triangular" else base.n_rules)
     features = np.zeros((20, base.n_rules))
     for s, k in product(range(20), range(rules.shape[1])):
         features[s, rules[s, k]] += strengths[s, k]
@@ -148,28 +137,14 @@ def test_a_rule_base_refuses_an_impossible_own_block(n_own: int) -> None:
         RuleBase([LOW_HIGH] * 2, [(0, 1)], n_own)
 
 
-@pytest.mark.parametrize(
-    ("settings", "complaint"),
-    [
-        (RuleBaseSettings(order=4), r"order = 4, allowed 1 to 3 in state space 'demo'"),
-        (RuleBaseSettings(products=(("x0", "y"),)), "unknown variable 'y', known: x0, x1, x2"),
-        (
-            RuleBaseSettings(products=(("x0", "x0"),)),
-            r"learner\.rule_base\.products: \['x0', 'x0'\] must name .* each once",
-        ),
-        (RuleBaseSettings(products=((),)), "must name at least one variable"),
-    ],
-)
-def test_settings_that_do_not_fit_the_state_space(
-    settings: RuleBaseSettings, complaint: str
-) -> None:
-    with pytest.raises(ValueError, match=complaint):
-        RuleBase.build(space_of(3), settings)
+def test_an_order_above_the_number_of_variables_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"order = 4, allowed 1 to 3 in state space 'demo'"):
+        RuleBase.build(space_of(3), RuleBaseSettings(order=4))
 
 
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
 def test_squared_lengths_and_values_by_row(membership: str) -> None:
-    settings = RuleBaseSettings(membership=membership, memberships=4, products=(("x0", "x2"),))
+    settings = RuleBaseSettings(membership=membership, memberships=4, order=2)
     base = RuleBase.build(space_of(3), settings)
     rng = np.random.default_rng(3)
     states, theta = rng.uniform(-0.2, 1.2, (6, 3)), rng.normal(size=(6, base.n_rules))

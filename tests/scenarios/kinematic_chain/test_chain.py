@@ -117,8 +117,8 @@ def test_failures_and_who_is_told_of_them(failure: dict[str, object], share: flo
         world.step(forth[0])
         predicted = world.predict().states(1, forth)[0]
         transition = world.step(forth[0])
-        assert transition.twists is not None
-        assert transition.twists[:, 2] == pytest.approx([0.6, share * 0.6])
+        assert transition.measured_twists() is not None
+        assert transition.measured_twists()[:, 2] == pytest.approx([0.6, share * 0.6])
         assert (np.abs(predicted - transition.states[1]).max() < 1e-9) == told
         assert transition.info["failed"].tolist() == [False, True]
 

@@ -37,7 +37,7 @@ SPEC = Spec.of(
         "learner": {"self_model": {"enabled": True}},
         "overrides": [
             {"name": "order 1"},
-            {"name": "a pair", "learner": {"rule_base": {"products": [["gap", "side"]]}}},
+            {"name": "a pair", "learner": {"rule_base": {"order": 2}}},
             {"name": "random", "learner": {"kind": "frozen", "decision": {"rule": "random"}}},
             {
                 "name": "learned",

@@ -167,7 +167,6 @@ def test_everything_that_matters_is_in_the_identity(monkeypatch):
         ({"scenario": {"box": "squire"}}, "squire"),
         ({"topology": {"kind": "chain", "order": ["a", "b"]}}, "a"),
         ({"learner": {"rule_base": {"order": 9}}}, "9"),
-        ({"learner": {"rule_base": {"products": [["gap", "nothing"]]}}}, "nothing"),
     ],
 )
 def test_settings_that_do_not_fit_are_refused_before_anything_runs(table, said):

@@ -283,12 +283,10 @@ def test_an_environment_without_poses_is_refused(settings: Any) -> None:
         team_of(settings.build())
 
 
-def test_calibration_and_errors_of_constants_are_refused() -> None:
+def test_calibration_is_refused() -> None:
     scenario = BoxPushingSettings().build()
     with pytest.raises(ValueError, match=r"learner.calibration.enabled: .* 'poses'"):
         team_of(scenario, calibration={"enabled": True})
-    with pytest.raises(ValueError, match=r"errors.constants = 0.1: .* no constants"):
-        team_of(scenario, decision={"errors": {"constants": 0.1}})
 
 
 def test_a_self_model_learns_the_effects_of_wheels_beside_the_poses() -> None:

@@ -17,7 +17,7 @@ from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction
 
 DECISION = {"value_of": "team", "evaluator": "best-response"}
-PRODUCTS = RuleBaseSettings(products=(("gap", "side"), ("wheel_speed", "gap")))
+PRODUCTS = RuleBaseSettings(order=2)
 SIX = tuple(f"robot{r}.{side}" for r in (3, 1, 2) for side in ("left", "right"))
 
 
