@@ -33,6 +33,7 @@ from .polygons import (
     checked_polygon,
     convex_pieces,
     moments,
+    nearby_origin,
     polygon_edges,
 )
 from .settings import GRAVITY, BoxSettings
@@ -85,11 +86,16 @@ class BoxSpec:
     @cached_property
     def _centered(self) -> tuple[Polygon, FloatArray]:
         """The polygon around its centroid, and the center of mass ``(2,)`` in its frame."""
-        polygon = checked_polygon(self.name, self.vertices, self.holes)
+        origin = nearby_origin(self.name, self.vertices)
+        outline, *holes = [
+            [(x - origin[0], y - origin[1]) for x, y in ring]
+            for ring in (self.vertices, *self.holes)
+        ]
+        polygon = checked_polygon(self.name, outline, holes)
         centroid = np.array(polygon.centroid.coords[0])
         center = np.zeros(2)
         if self.center_of_mass is not None:
-            center = self.center_of_mass - centroid
+            center = self.center_of_mass - origin - centroid
         if not polygon.convex_hull.contains(Point(centroid + center)):
             raise ValueError(
                 f"box {self.name!r}: center_of_mass = {self.center_of_mass}, must be within its "

@@ -30,7 +30,12 @@ LEAST_EDGE = 1e-6
 LEAST_PIECE = 1.1921e-9
 """Smallest area of a convex piece [m2]: Box2D takes none below the epsilon of single precision."""
 FARTHEST = 100.0
-"""Maximum coordinate of a vertex [m]."""
+"""Maximum coordinate of a vertex [m], relative to `nearby_origin`."""
+FAR = 10.0
+"""Distance from the origin, in lengths of a polygon, beyond which vertices are counted from the
+first of them."""
+RESOLUTION = 1e-7
+"""Coarsest spacing of floating-point coordinates, in lengths of a polygon."""
 STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
 
@@ -66,6 +71,29 @@ def polygon_edges(polygon: Polygon) -> FloatArray:
     """Return the edges ``(n, 4)`` of an oriented polygon and its holes, material on the left."""
     rings = [polygon.exterior, *polygon.interiors]
     return np.vstack([ring_edges(np.asarray(ring.coords)[:-1]) for ring in rings])
+
+
+def nearby_origin(name: str, vertices: Vertices) -> FloatArray:
+    """Return the point ``(2,)`` from which vertices are counted: the first one if all are far away.
+
+    Map coordinates are far away: moments about their origin would lose all digits.
+
+    Raises
+    ------
+    ValueError
+        If the coordinates are too coarse for the size of the polygon.
+    """
+    ring = np.asarray(vertices, dtype=float)
+    farthest = float(np.abs(ring).max())
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = float(np.ptp(ring, axis=0).max())
+    spacing = float(np.spacing(farthest))
+    if spacing > RESOLUTION * size > 0:
+        raise ValueError(
+            f"box {name!r}: coordinates of {farthest:.3g} m are {spacing:.2g} m apart, too coarse "
+            f"for {size:.3g} m of outline, allowed: coordinates from a point nearby"
+        )
+    return ring[0] if farthest > FAR * size else np.zeros(2)
 
 
 def checked_polygon(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
