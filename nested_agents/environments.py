@@ -104,9 +104,10 @@ def _arguments(kind: str, steps: int | None, options: Mapping[str, Any]) -> dict
 
     own = {key: options[key] for key in ("by_agent", "render_mode") if key in options}
     table = tuples({key: value for key, value in options.items() if key not in own})
-    if steps is None:
-        steps = {known: most for known, most in WORLDS.values()}[kind]
     scenario = checked_scenario(SCENARIOS.parsed(kind, **table).build())
+    steps = dict(WORLDS.values()).get(kind) if steps is None else steps
+    if steps is None:
+        raise ValueError(f"steps is missing: kind = {kind!r} has no default, give a number")
     return {"scenario": scenario, "steps": steps, **own}
 
 

@@ -245,3 +245,11 @@ def test_refusals(arguments: dict[str, Any], complaint: str) -> None:
 def test_wrong_settings_are_one_line() -> None:
     with pytest.raises(ValueError, match="robot = 4: must be a string, or must be a table"):
         environments.parallel("box-pushing", robot=4)
+
+
+def test_a_kind_is_known_and_has_its_own_steps() -> None:
+    with pytest.raises(ValueError, match="did you mean 'box-pushing'"):
+        environments.joint("box-pushin")
+    with pytest.raises(ValueError, match="steps is missing: kind = 'gymnasium'"):
+        environments.joint("gymnasium", id="Pendulum-v1")
+    assert environments.parallel("box-pushing").steps == 450
