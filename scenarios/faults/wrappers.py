@@ -79,12 +79,12 @@ def action_bounds(space: Space, name: str) -> tuple[FloatArray, FloatArray]:
 class ActionScale:
     """The actuators of an action space, as deviations from rest.
 
+    At rest an entry of a Box is 0 if that is possible, others are in the middle of their range.
+
     Parameters
     ----------
     space
         The action space: a bounded Box, Discrete or MultiDiscrete.
-    rest
-        Action at rest. By default 0 if a Box contains it, else the middle.
     name
         Name of the space in error messages.
 
@@ -96,7 +96,7 @@ class ActionScale:
     Raises
     ------
     ValueError
-        If the space is of another kind or unbounded, or does not contain `rest`.
+        If the space is of another kind or unbounded.
 
     Examples
     --------
@@ -107,18 +107,11 @@ class ActionScale:
     1
     """
 
-    def __init__(
-        self, space: Space, rest: ArrayLike | None = None, name: str = "action space"
-    ) -> None:
+    def __init__(self, space: Space, name: str = "action space") -> None:
         self.space = space
         self._low, self._high = (ends.astype(float) for ends in action_bounds(space, name))
-        if rest is None:
-            has_zero = isinstance(space, Box) & (self._low <= 0) & (self._high >= 0)
-            self._rest = np.where(has_zero, 0.0, (self._low + self._high) / 2)
-        elif space.contains(rest):
-            self._rest = np.ravel(rest).astype(float)
-        else:
-            raise ValueError(f"rest = {rest!r}: no action of {space}")
+        has_zero = isinstance(space, Box) & (self._low <= 0) & (self._high >= 0)
+        self._rest = np.where(has_zero, 0.0, (self._low + self._high) / 2)
         self.limits: FloatArray = np.maximum(self._high - self._rest, self._rest - self._low)
 
     def place(self, action: ArrayLike) -> FloatArray:
@@ -289,8 +282,6 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         Seed of the noise of faults, in addition to that of the environment.
     commands
         Physical meaning of actions, see `Commands`.
-    rest
-        Action at rest. By default 0 where possible, else the middle of the range.
     mechanism
         Function that applies the faults that no action can express.
     inform
@@ -314,12 +305,10 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
         self,
         env: Environment,
         faults: Sequence[ActuatorFault],
-        *,
-        rest: ArrayLike | None = None,
         **options: Any,
     ) -> None:
         gymnasium.Wrapper.__init__(self, env)
-        _Faulty.__init__(self, {"": ActionScale(env.action_space, rest)}, faults, **options)
+        _Faulty.__init__(self, {"": ActionScale(env.action_space)}, faults, **options)
 
     def step(self, action: ArrayLike) -> tuple[Data, Data, bool, bool, dict[str, object]]:
         """Execute an action with faulty actuators."""
@@ -340,8 +329,6 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         all actuators of an agent.
     faults, seed, commands, mechanism, inform
         As in `FaultyEnv`; the ``info`` of an agent has only its own faults.
-    rest
-        Actions at rest, by agent.
 
     Attributes
     ----------
@@ -355,14 +342,11 @@ class FaultyParallelEnv(_Faulty, BaseParallelWrapper):
         self,
         env: Environment,
         faults: Sequence[ActuatorFault],
-        *,
-        rest: Mapping[str, ArrayLike] | None = None,
         **options: Any,
     ) -> None:
         BaseParallelWrapper.__init__(self, env)
-        rests = rest or {}
         scales = {
-            agent: ActionScale(env.action_space(agent), rests.get(agent), f"action space {agent}")
+            agent: ActionScale(env.action_space(agent), f"action space {agent}")
             for agent in env.possible_agents
         }
         _Faulty.__init__(self, scales, faults, **options)

@@ -57,7 +57,6 @@ class Wrapping(TypedDict, total=False):
     """Further arguments of `FaultyEnv`."""
 
     commands: Commands
-    rest: Data
     mechanism: Mechanism
     inform: bool
 

@@ -217,7 +217,6 @@ def test_the_number_of_the_episode_is_an_option_of_ours_alone() -> None:
          "faults[0].actuators = 'hip': no such actuator, allowed 0, 1"),
         (lambda: faults.FaultyEnv(Told(BOX), [faults.Seized(actuators=0)]), "no effort can"),
         (lambda: faults.FaultyEnv(Told(BOX), [], commands="torque"), "commands = 'torque'"),
-        (lambda: faults.FaultyEnv(Told(BOX), [], rest=np.array([3.0, 0.0])), "rest = "),
         (lambda: faults.FaultyEnv(Told(Box(-np.inf, np.inf, (1,))), []), "finite bounds"),
         (lambda: faults.FaultyEnv(Told(gymnasium.spaces.MultiBinary(2)), []), "allowed: Discrete"),
     ],
