@@ -179,11 +179,11 @@ def test_a_graph_with_a_cycle_is_refused() -> None:
 @pytest.mark.parametrize(
     ("bodies", "message"),
     [
-        ([["a"], ["b"], ["c"], ["d"]], "must be agent indices by body, 0 to 3"),
-        ([(0, 1), (2, 9)], "must be agent indices by body, 0 to 3"),
-        ([(0, 1), (2, -1)], "must be agent indices by body, 0 to 3"),
-        ([0, 1, 2, 3], "must be agent indices by body, 0 to 3"),
-        (["ab", "cd"], "must be agent indices by body, 0 to 3"),
+        ([["a"], ["b"], ["c"], ["d"]], "must be groups of agent indices, 0 to 3"),
+        ([(0, 1), (2, 9)], "must be groups of agent indices, 0 to 3"),
+        ([(0, 1), (2, -1)], "must be groups of agent indices, 0 to 3"),
+        ([0, 1, 2, 3], "must be groups of agent indices, 0 to 3"),
+        (["ab", "cd"], "must be groups of agent indices, 0 to 3"),
         ([(0, 1), (1, 2, 3)], "agent 'b' occurs more than once in bodies"),
         ([(0, 1), (2,)], "agent 'd' is missing from bodies"),
     ],
