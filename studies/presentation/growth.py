@@ -1,17 +1,14 @@
 """The figure of laws of growth: what was measured, the law, and what it predicts."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..errors import SpecError
 from ..laws.fitting import Law
 from ..laws.samples import LOGIT
-from ..laws.scaling import ScalingLaw, scaling_law
-from ..results.results import Results
+from ..laws.scaling import ScalingLaw
 from ..results.statistics import stack_estimates
 from . import figures
 
@@ -21,20 +18,6 @@ MARGIN = 2.0
 """Factor by which a logarithmic axis extends beyond what was measured and the laws."""
 BEYOND = 2.0
 """Factor by which a curve extends beyond the largest size if no size is predicted."""
-
-REPORTED = {"success": "growth-of-success", "decision_median": "growth-of-the-time-of-a-decision"}
-"""Names of the figures of laws in a report, by measure."""
-
-
-def growth_figures(results: Results) -> dict[str, Figure]:
-    """Return the laws of a study that sweeps a size, one figure a measure, as far as there are."""
-    drawn = {}
-    for measure, name in REPORTED.items():
-        with suppress(SpecError):
-            analysis = scaling_law(results, measure)
-            if analysis.laws:
-                drawn[name] = draw_laws(analysis)
-    return drawn
 
 
 def draw_laws(analysis: ScalingLaw) -> Figure:

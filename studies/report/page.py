@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..presentation.growth import growth_figures
 from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
@@ -69,7 +68,6 @@ def page(directory: Path) -> str:
         analysis = analyse_as(outline.study, results)
         figures = dict(draw_figures(load_study(outline.study), analysis))
         scalability = _scalability(results, settings)
-    figures |= growth_figures(results) if outline.study == "scaling" else {}
     notes = _notes(results, analysis)
     if older is not None:
         notes = (older, *notes)

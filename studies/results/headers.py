@@ -37,14 +37,8 @@ def extends(path: Path, content: bytes) -> bool:
     there = path.read_bytes()
     if path.name != HEADER or there == content:
         return there == content
-    with suppress(ValueError, RecursionError, AttributeError, KeyError):
-        (old, listed), (new, more) = (_without_files(text) for text in (there, content))
-        return bool(old == new and listed.items() <= more.items())
+    with suppress(ValueError, RecursionError, AttributeError, KeyError, TypeError):
+        old, new = json.loads(there), json.loads(content)
+        files = new["files"] | old["files"]
+        return bool({**old, "files": files, CHECKSUM: ""} == {**new, CHECKSUM: ""})
     return False
-
-
-def _without_files(text: bytes) -> tuple[dict[str, object], dict[str, str]]:
-    """Return the description of a study, and the checksums of files that it lists."""
-    table = json.loads(text)
-    del table[CHECKSUM]
-    return table, table.pop("files")

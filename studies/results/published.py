@@ -7,7 +7,7 @@ committed files give the table that the run gave.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -98,11 +98,10 @@ def _pack_numbers(results: Results, wanted: Callable[[str], bool]) -> dict[str, 
 
 
 class Published(NamedTuple):
-    """Results with their spec as a table, and the version of the code that they are of."""
+    """Results with their spec as a table, and notes on them."""
 
     outline: StudyOutline
     results: Results
-    version: int
     notes: tuple[str, ...]
 
 
@@ -132,7 +131,7 @@ def loads(text: str) -> Published:
         for condition, named in _arrays(file.usage, "usage", file.seeds).items()
     }
     results = from_arrays(phases, file.seeds, numbers, usage, file.columns, file.measures)
-    return Published(file.outline, file.limited(results), file.results_version, file.notes)
+    return Published(file.outline, file.limited(results), file.notes)
 
 
 def _arrays(
@@ -192,18 +191,6 @@ def _check_episodes(arrays: Mapping[str, Array], key: str, measures: Sequence[Me
             raise ValueError(f"{key}.steps: must be whole numbers, none below 0")
     if len({np.isnan(array).tobytes() for array in arrays.values()}) > 1:
         raise ValueError(f"{key}: must have as many episodes of every measure")
-
-
-def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
-    """Read the files of studies; those that are missing are left out.
-
-    Raises
-    ------
-    SpecError
-        If a file is not what `dumps` writes.
-    """
-    paths = {study: folder / f"{study}.json" for study in studies}
-    return {study: load(path) for study, path in paths.items() if path.exists()}
 
 
 def load(path: Path) -> Published:

@@ -146,7 +146,7 @@ class Results:
         """
         rows = self._rows[phase, condition]
         values = self._measured[measure][rows]
-        seeds = self._places["seed"][rows]
+        seeds = self._seeds[rows]
         starts = 1 + np.flatnonzero(seeds[1:] != seeds[:-1])
         series = [own[part] for own in np.split(values, starts)]
         values = pad_rows(series)
@@ -163,12 +163,10 @@ class Results:
         An episode that a seed lacks is not a number.
         """
         rows = self._rows[phase, condition]
-        values = self._measured[measure][rows]
-        rows = rows[~np.isnan(values)]
-        places = {name: own[rows] for name, own in self._places.items()}
-        frame = pd.DataFrame({**places, "value": values[~np.isnan(values)]})
-        wide = frame.pivot(index="seed", columns="episode", values="value")
-        return wide.loc[frame["seed"].unique()]
+        places = self.episodes[["seed", "episode"]].iloc[rows]
+        known = places.assign(value=self._measured[measure][rows]).dropna()
+        wide = known.pivot(index="seed", columns="episode", values="value")
+        return wide.loc[known["seed"].unique()]
 
     def means(self, condition: str, phase: str, measure: str = SUCCESS.name) -> pd.Series:
         """Return the means of a measure's values by seed, of the seeds that have any."""
@@ -223,9 +221,9 @@ class Results:
         }
 
     @cached_property
-    def _places(self) -> dict[str, Array]:
-        """Seed and number of each row of episodes."""
-        return {name: self.episodes[name].to_numpy() for name in ("seed", "episode")}
+    def _seeds(self) -> Array:
+        """Seed of each row of episodes."""
+        return self.episodes["seed"].to_numpy()
 
     @cached_property
     def _measured(self) -> dict[str, Array]:

@@ -236,7 +236,7 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
     for text in ("{}", "not JSON", "[]"):
         (tmp_path / "shapes.json").write_text(text)
         with pytest.raises(ValueError, match=r"shapes\.json: holds no published results"):
-            published.read(tmp_path, ["shapes"])
+            published.load(tmp_path / "shapes.json")
 
 
 def test_results_of_another_version_are_told(tmp_path: Path, capsys, monkeypatch) -> None:

@@ -13,7 +13,6 @@ from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.laws.scaling import scaling_law
-from nested_agents.studies.presentation.growth import growth_figures
 from nested_agents.studies.results.results import from_arrays
 from research import RESULTS
 
@@ -142,12 +141,6 @@ def test_equal_values_are_no_law() -> None:
 def test_seeds_that_agree_do_not_make_a_law_certain() -> None:
     law = scaling_law(made_up({"chain": 1.0}), "steps")
     assert "all seeds agree, so that intervals" in " ".join(" ".join(law.notes).split())
-
-
-def test_figures_of_a_report_are_of_measures_with_a_law() -> None:
-    results = made_up({"chain": 3.0, "star": 5.0})
-    assert list(growth_figures(results)) == ["growth-of-success"]
-    assert growth_figures(made_up({"chain": 3.0}, sizes=(2, 4))) == {}
 
 
 CARTS = {
