@@ -26,10 +26,12 @@ import pickle
 import re
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from stat import S_IMODE
 from time import perf_counter
 from types import CodeType, FunctionType
 from typing import IO, Any, TypeAlias, TypeVar, cast
@@ -133,7 +135,12 @@ class Kernel:
         )
         copy.__module__ = function.__module__
         copy.__qualname__ = function.__qualname__ + suffix
-        compiled = numba.njit(**self._options, **options)(copy)
+        compile_lazily = numba.njit(**self._options, **options)
+        try:
+            compiled = compile_lazily(copy)
+        except RuntimeError:  # neither the folder of the package nor that of the user is writable
+            numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = _temporary_folder()
+            compiled = compile_lazily(copy)
         file = _cache_file(compiled)
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
             from .kernel_cache import CheckedCacheFile
@@ -175,6 +182,19 @@ class Kernel:
                 pickle.dump((sys.path, *place, pickle.dumps(types)), requests)
                 requests.flush()
                 answers.read(1)
+
+
+def _temporary_folder() -> str:
+    """Return a folder for temporary kernels, to which only this user can write.
+
+    All processes of the user share it, because each of them would compile for a minute.
+    """
+    folder = Path(tempfile.gettempdir(), f"nested-agents-{os.getuid()}")
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    status = folder.lstat()
+    is_own = status.st_uid == os.getuid() and S_IMODE(status.st_mode) == 0o700
+    return str(folder) if is_own else tempfile.mkdtemp(prefix=f"{folder.name}-")
 
 
 @cache

@@ -65,7 +65,7 @@ def scaling_law(
         Of episodes, ``steps``, ``return`` or a number of whole trials, by name; by default the
         first, which is success, or the return where nothing is one.
     phase
-        Of the episodes; by default ``evaluation``, or where there is none ``training``.
+        Phase of the episodes; by default the one that ``compare`` takes.
     size
         The swept key, or its last part, as ``robots``; by default the number of robots or agents.
     criterion

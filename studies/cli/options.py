@@ -231,6 +231,13 @@ columns = click.option(
 )
 """Roles of the columns of a table, see `nested_agents.studies.api.loading.load`."""
 
+better = click.option(
+    "--better",
+    type=click.Choice(["higher", "lower"]),
+    help="Which scores of other tools are better; by default higher ones.",
+)
+"""Direction of the scores of a table."""
+
 
 def formats(*choices: str, text: str = "Output format.") -> Decorator:
     """Return the option ``--format``; the first choice is its default."""

@@ -156,7 +156,7 @@ def scaling_law(
         Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials; with a
         criterion the name of a rate.
     phase
-        Phase of the episodes; by default ``evaluation``, or ``training`` if there is none.
+        Phase of the episodes; by default the one that `compare_conditions` takes.
     size
         A swept key that is a number, or the last part of it; by default the only one there is.
     criterion
@@ -193,9 +193,7 @@ sizes and of values with a row for each seed and a column for each condition."""
 
 def _measured(results: Results, measure: str, phase: str | None) -> Measured:
     """Return the means of seeds of a measure."""
-    phases = [phase] if phase else ["evaluation", "training"]
-    own = next((p for p in phases if p in results.phases), phases[0])
-    shown_as, values, own = values_of(results, measure, own)
+    shown_as, values, own = values_of(results, measure, phase)
     title = title_of(shown_as, own)
     if not shown_as.is_rate:
         return (
@@ -205,7 +203,7 @@ def _measured(results: Results, measure: str, phase: str | None) -> Measured:
         )
     episodes = results.episodes[results.episodes["phase"] == own]
     counts = episodes.groupby("condition", sort=False)["seed"].agg(["size", "nunique"])
-    of_seed = counts["size"] / counts["nunique"]
+    of_seed = (counts["size"] / counts["nunique"]).reindex([*values], fill_value=1.0)
     return (
         title,
         values,

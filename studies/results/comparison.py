@@ -187,9 +187,8 @@ def _group(
         estimates = {title_of(measure, phase): mean_estimate(measure, own)}
         if name in by_name:
             estimates |= _difference_columns(by_name[name], measure)
-            if by_name[name].paired:
-                count = _left_out(results, own, values[members[reference]])
-                left_out += [f"{reference} and {title}, {count}"] if count else []
+            count = _left_out(results, own, values[members[reference]], paired=by_name[name].paired)
+            left_out += [f"{reference} and {title}, {count}"] if count else []
         lines.append(Summary(title, len(own), estimates))
     return ComparisonGroup(
         setting=setting,
@@ -261,22 +260,30 @@ def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[
     if pairs_episodes:
         seeds = own.index.intersection(base.index, sort=False)
         episodes = own.columns.intersection(base.columns)
-        shared = [values.loc[seeds, episodes] for values in (own, base)]
-        both = shared[0].notna() & shared[1].notna()
-        own, base = (values.where(both).dropna(how="all") for values in shared)
+        own, base = own[episodes], base[episodes]
+        if len(seeds) >= MIN_RUNS:
+            own, base = own.loc[seeds], base.loc[seeds]
+            both = own.notna() & base.notna()
+            own, base = own.where(both), base.where(both)
+        own, base = own.dropna(how="all"), base.dropna(how="all")
     return row_means(own), row_means(base)
 
 
-def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame) -> str:
-    """Return the number of runs, or of paired scores, that only one of two conditions has."""
+def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame, *, paired: bool) -> str:
+    """Return the number of runs or scores without a partner in the other condition.
+
+    Independent samples need no partners, except that both have scores on the same items.
+    """
     index, other = own.index, base.index
     unit = "runs"
     if results.pairs_episodes:
         index, other = own.stack().dropna().index, base.stack().dropna().index
         unit = "scores"
-    total = len(index) + len(other)
-    count = total - 2 * len(index.intersection(other))
-    return f"{count} of {total} {unit}" if count else ""
+    if not paired:
+        index, other = (keys.get_level_values(-1) for keys in (index, other))
+    count = int((~index.isin(other)).sum() + (~other.isin(index)).sum())
+    is_known = paired or results.pairs_episodes
+    return f"{count} of {len(index) + len(other)} {unit}" if count and is_known else ""
 
 
 def values_of(
@@ -304,7 +311,7 @@ def values_by_seed(
         raise SpecError("no trial has finished")
     if phase is not None and phase not in results.phases:
         raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
-    has_failed = any("onset" in results.numbers(condition) for condition in results.conditions)
+    has_failed = any("onset" in results.numbers(c) for c in results.of_phase("training"))
     recovery = RECOVERY if has_failed else {}
     measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
     titles = {m.heading: m.name for m in reversed([*measures.values()])}
@@ -327,7 +334,9 @@ def values_by_seed(
                 f"{MIN_LARGEST:g}, or 0; use a smaller unit"
             )
         return measure, known, phase
-    return _trial_numbers(results, name, {*measures, *recovery})
+    episodes = results.episodes
+    present = {m for m in measures if m in episodes and episodes[m].notna().any()}
+    return _trial_numbers(results, name, present | {*recovery})
 
 
 def _trial_numbers(

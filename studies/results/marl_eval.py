@@ -32,6 +32,7 @@ from .scores import (
     WHOLE,
     Better,
     ScoreResults,
+    alike_note,
     at_last_step,
     joined_notes,
     left_out_note,
@@ -239,6 +240,8 @@ def results_of_runs(runs: Runs, better: Better, header: Header | None) -> ScoreR
     notes = []
     if len(ignored):
         notes.append(f"keys that are no steps are ignored: {', '.join(sorted(ignored))}")
+    notes += alike_note("algorithm", frame["algorithm"])
+    notes += alike_note("seed", frame["seed"].str.removeprefix(SEED), are_runs=True)
     if n_empty:
         notes.append(f"{n_empty} of {len(runs)} runs have measured nothing: left out")
     phases, chosen = _phases(frame, is_exported=header is not None)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.numerics import stats
-from .statistics import MAX_VALUES, Array, blocks
+from .statistics import MAX_VALUES, ROUNDING, Array, blocks
 
 LEVEL = 0.05
 """Level of significance: a difference is significant if its adjusted p is below."""
@@ -191,7 +191,7 @@ def independent_permutation(first: ArrayLike, second: ArrayLike) -> float:
         rng=np.random.default_rng(0),
     )
     # SciPy's tolerance of ties does not grow with the values, but their rounding does.
-    rounding = 16.0 * np.finfo(float).eps * max(float(abs(own).max()) for own in samples)
+    rounding = ROUNDING * max(float(abs(own).max()) for own in samples)
     others = result.null_distribution
     is_exact = comb(n_runs, len(samples[0])) <= n_permutations
     observed = 0 if is_exact else 1

@@ -38,6 +38,10 @@ intervals of 10 to 30 seeds and 10 episodes then cover the truth in 94 to 97% of
 69 to 75% without them."""
 
 
+ROUNDING = 16.0 * float(np.finfo(float).eps)
+"""Difference of two values, relative to the larger one, that may be due to rounding."""
+
+
 class Estimate(NamedTuple):
     """A value with its interval; arrays of equal shape, or scalars."""
 
@@ -272,6 +276,23 @@ def welch(first: ArrayLike, second: ArrayLike) -> Estimate:
     return Estimate(value, np.asarray(low), np.asarray(high))
 
 
+def tied(own: Array, base: Array) -> list[Array]:
+    """Return the ranks of the values of two samples, equal if values differ by rounding only.
+
+    Examples
+    --------
+    >>> tied(np.array([0.1 + 0.2, 1.0]), np.array([0.3]))
+    [array([0., 1.]), array([0.])]
+    """
+    values = np.concatenate([own, base])
+    order = np.argsort(values)
+    ascending = values[order]
+    is_higher = np.diff(ascending) > ROUNDING * np.maximum(*np.abs([ascending[1:], ascending[:-1]]))
+    ranks = np.zeros(len(values))
+    ranks[order[1:]] = np.cumsum(is_higher)
+    return np.split(ranks, [len(own)])
+
+
 def cliffs_delta(own: Array, base: Array) -> float:
     """Return Cliff's delta (1993): the probability of a higher value minus that of a lower one.
 
@@ -283,7 +304,7 @@ def cliffs_delta(own: Array, base: Array) -> float:
     0.75
     """
     n_pairs = len(own) * len(base)
-    ranks = stats.rankdata(np.concatenate([own, base]))[: len(own)]
+    ranks = stats.rankdata(np.concatenate(tied(own, base)))[: len(own)]
     wins = float(ranks.sum()) - len(own) * (len(own) + 1) / 2.0  # Mann and Whitney's U
     return (2.0 * wins - n_pairs) / n_pairs
 
@@ -310,7 +331,8 @@ def probability_higher(pairs: Sequence[tuple[Array, Array]]) -> Estimate:
     0.875
     """
     drawn = np.zeros(PROBABILITY_RESAMPLES)
-    for task, (own, base) in enumerate(pairs):
+    for task, pair in enumerate(pairs):
+        own, base = tied(*pair)
         order = np.argsort(base)
         lower, not_higher = (
             np.searchsorted(base, own, side, sorter=order) for side in ("left", "right")

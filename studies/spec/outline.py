@@ -132,7 +132,7 @@ def other_spec(store: Store) -> str | None:
             copy = tomllib.loads(dumps(Spec.of(copy, sources_of(store)).table()))
             own = tomllib.loads(dumps(own))  # without what is None
     except (OSError, ValueError, RecursionError) as error:
-        return f"{path}: is not the spec of {DATABASE} in its folder: {error}"
+        return f"{path}: cannot be compared with {DATABASE} in its folder: {error}"
     for key in sorted(own.keys() | copy.keys()):
         here = copy.get(key, "absent")
         there = own.get(key, "absent")

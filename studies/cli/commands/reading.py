@@ -113,11 +113,7 @@ class Compared(TypedDict):
 @options.plot
 @options.where
 @options.columns
-@click.option(
-    "--better",
-    type=click.Choice(["higher", "lower"]),
-    help="Which scores of other tools are better; by default higher ones.",
-)
+@options.better
 @options.out("Write a page with verdicts, table, statistics and figure.", "FILE.html")
 @options.form
 @options.trust

@@ -103,8 +103,8 @@ def run(
         if not (out / DATABASE).exists() or os.path.realpath(spec) != own:
             raise
         raise SpecError(
-            f"{error}; if you did not edit {spec}, it is damaged: {command_line('retry', out)} "
-            "continues from the database"
+            f"{error}; if {spec} is damaged, {command_line('retry', out)} continues from the "
+            "database"
         ) from None
     return show_results(run(changed, out, observer=Terminal(), **running), figures)
 

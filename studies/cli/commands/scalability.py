@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -15,7 +15,7 @@ from ..loading import read_results, say_remarks
 if TYPE_CHECKING:
     from ...api.study import StudyResults
 
-READING = {"sources", "columns", "where", "trust"}
+READING = {"sources", "columns", "better", "where", "trust"}
 """Parameters that say what is read."""
 
 
@@ -61,6 +61,7 @@ READING = {"sources", "columns", "where", "trust"}
     help="Compare the predictions of a file with these results: which of them held.",
 )
 @options.columns
+@options.better
 @options.plot
 @options.where
 @options.form
@@ -72,6 +73,7 @@ def scalability(
     out: Path | None,
     check: Path | None,
     columns: tuple[str, ...],
+    better: Literal["higher", "lower"] | None,
     plot: Path | None,
     where: str | None,
     form: Form,
@@ -91,7 +93,7 @@ def scalability(
         options.refuse_unused("with --predict", READING | {"predict", "out", "measure", "size"})
     elif out is not None:
         raise click.UsageError("--out: is not used without --predict")
-    loaded = read_results(sources, where=where, trust=trust, columns=columns)
+    loaded = read_results(sources, where=where, trust=trust, columns=columns, better=better)
     say_remarks(loaded)
     if check is not None:
         return _check(loaded, check, form)

@@ -1,5 +1,6 @@
 """Cached kernels are taken only as long as nothing has changed that they are made of."""
 
+import os
 import re
 import subprocess
 import sys
@@ -70,6 +71,27 @@ def test_an_edit_of_what_is_called_or_read_is_noticed(
     assert called(package) == (5, 1, True)
     (package / "constants.py").write_text("FACTOR = 7\n")
     assert called(package) == (10, 1, True)
+
+
+def test_kernels_are_compiled_where_no_folder_can_be_written(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    temporary, file = package.parent / "temporary", package / "constants.py"
+    temporary.mkdir()
+    for folder in (package, package / "inner"):
+        (folder / "__pycache__").touch()  # a file, so that no folder can have this name
+    for name in ("HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(file))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    shared = temporary / f"nested-agents-{os.getuid()}"
+    shared.mkdir(mode=0o777)
+    shared.chmod(0o777)  # everybody could write code there
+    assert called(package)[:2] == (6, 1)  # by a process that only compiles, as elsewhere
+    assert not [*shared.iterdir()]
+    shared.rmdir()
+    assert called(package)[:2] == (6, 1)
+    assert [*shared.iterdir()]
 
 
 def test_a_class_that_is_renamed_spoils_no_cache(

@@ -1,5 +1,6 @@
 """Tables of scores that other tools have measured: read, checked, compared."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,21 @@ def test_a_repeated_seed_is_shown_as_the_file_has_it(tmp_path) -> None:
     path.write_text("condition,seed,phase,episode,steps\n" + "a,0,training,0,5\n" * 2)
     with pytest.raises(SpecError, match="condition = 'a', phase = 'training', seed = '0', ep"):
         na.load(path, columns=["score=steps,item=episode"])
+
+
+def test_runs_of_other_names_are_independent_samples_of_common_items(scores) -> None:
+    renamed = scores.assign(run=scores["topology"] + scores["run"].astype(str))
+    lacks = renamed[(renamed["topology"] != "ring") | (renamed["question"] != "q3")]
+    compared = na.compare_table(lacks, score="right", **ROLES)
+    ring, star = compared.differences
+    own, base = (
+        lacks[(lacks["topology"] == name) & (lacks["question"] != "q3")]["right"].mean()
+        for name in ("ring", "chain")
+    )
+    assert not ring.paired
+    assert not star.paired
+    assert float(ring.estimate.value) == pytest.approx(own - base)
+    assert "chain and ring, 8 of 56 scores" in " ".join(str(compared).split())
 
 
 def test_columns_of_conditions_are_crossed(scores) -> None:
@@ -305,6 +321,33 @@ def test_names_that_look_alike_stay_apart_and_are_told(column: str, names: tuple
     assert len({seed for label in labels for seed in results.seeds(label)}) == len({*firsts}) + 3
     told = [note for note in notes if "look alike" in note]
     assert [note.startswith(f"{column}: {names[0]!a} and {names[1]!a}") for note in told] == [True]
+
+
+def test_the_size_with_the_smallest_loss_may_be_the_best(tmp_path: Path, capsys) -> None:
+    rows = [(size, seed, size + 0.1 * seed) for size in (2, 4, 8) for seed in range(4)]
+    path = tmp_path / "losses.csv"
+    pd.DataFrame(rows, columns=["condition", "seed", "score"]).to_csv(path, index=False)
+    best = {}
+    for better in ("higher", "lower"):
+        assert main(["scalability", str(path), "--better", better]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        (best[better],) = re.findall(r"is best with [^.]*: (\d+) for", said)
+    assert best == {"higher": "8", "lower": "2"}
+
+
+def test_only_measures_of_the_table_are_proposed(scores) -> None:
+    with pytest.raises(SpecError, match="known: right, tokens$"):
+        na.compare_table(scores, score=["right", "tokens"], measure="token count", **ROLES)
+
+
+def test_means_of_decimals_tie_as_exact_ones_do() -> None:
+    # Means of 0.1 + 0.2 and of 0.3 + 0: equal numbers, floats that differ in the last bit.
+    items = {"a": (0.1, 0.2), "b": (0.3, 0.0)}
+    rows = [(c, s, k, v) for c, own in items.items() for s in range(4) for k, v in enumerate(own)]
+    frame = pd.DataFrame(rows, columns=["condition", "seed", "item", "score"])
+    (difference,) = na.compare_table(frame).differences
+    assert difference.cliffs_delta == 0.0
+    assert difference.improvement("higher").value == 0.5
 
 
 def test_small_scores_are_shown_and_tiny_ones_refused(tmp_path: Path, capsys) -> None:

@@ -249,3 +249,30 @@ def test_algorithms_that_share_no_step_are_refused(tmp_path: Path, capsys) -> No
     path.write_text(json.dumps({"env": {"task": {"A": {"s": SERIES}, "B": {"s": other}}}}))
     assert main(["compare", str(path)]) == 2
     assert "return: most runs of every condition share no step_count" in capsys.readouterr().err
+
+
+def test_fits_describe_what_is_compared(tmp_path: Path) -> None:
+    runs = {
+        str(size): {
+            f"seed_{seed}": {
+                f"step_{k}": {"step_count": 10 * k, "return": [size * k + seed]} for k in range(4)
+            }
+            for seed in range(3)
+        }
+        for size in (2, 4, 8, 16)
+    }
+    path = tmp_path / "sizes.json"
+    path.write_text(json.dumps({"vmas": {"balance": runs}}))
+    study = na.load(path)
+    (law,) = na.scaling_law(study).analysis.laws.values()
+    means = [next(iter(line.estimates.values())).value for line in study.compare().analysis.table]
+    assert law.sample.means.tolist() == pytest.approx(means)
+
+
+def test_runs_that_look_alike_are_told(tmp_path: Path) -> None:
+    balance = BENCHMARL["vmas"]["balance"]
+    zeros = {name.replace("seed_", "seed_0"): run for name, run in balance["mappo"].items()}
+    path = tmp_path / "zeros.json"
+    path.write_text(json.dumps({"vmas": {"balance": {**balance, "mappo": zeros}}}))
+    (remark,) = [line for line in na.load(path).remarks if "look alike" in line]
+    assert "'0' and '00'" in remark
