@@ -336,7 +336,7 @@ def test_the_size_with_the_smallest_loss_may_be_the_best(tmp_path: Path, capsys)
 
 
 def test_only_measures_of_the_table_are_proposed(scores) -> None:
-    with pytest.raises(SpecError, match="known: right, tokens$"):
+    with pytest.raises(SpecError, match=r"known: right, tokens$"):
         na.compare_table(scores, score=["right", "tokens"], measure="token count", **ROLES)
 
 
