@@ -135,6 +135,9 @@ class TDLambdaSettings(LearnerSettings):
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Number of updates over which the agents average the learned weights to decide; 1: none."""
+    initial_weight: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    """Consequent weight of every rule before learning. With ``order = "full"`` it is the value of
+    every state; above attainable values it favors states that were not visited."""
     reward_of: Literal["left", "entered"] = "left"
     """Reward R in Eq. 7: that of the state left, s_previous, as printed; or that of the state
     entered, as in Section V, where rewards are computed after the move."""
@@ -166,6 +169,7 @@ class TDLambda(Online):
 
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
+        self.theta += settings.initial_weight
         self.updates: FloatArray = np.zeros(())
         self._entered: tuple[IntArray, FloatArray] | None = None
         if settings.averaging > 1:

@@ -48,6 +48,14 @@ def frozen_increments(
     return total[0]
 
 
+@pytest.mark.parametrize("averaging", [1.0, 10.0])
+def test_every_state_has_the_initial_weight_as_its_value(averaging: float) -> None:
+    learner = learner_of(EIGHT_RULES, 2, initial_weight=0.5, averaging=averaging)
+    values = EIGHT_RULES.values_of_agents(learner.theta, np.full((2, 1, 3), 0.3))
+    assert values == pytest.approx(np.full((2, 1), 0.5))
+    assert np.array_equal(learner.weights, learner.theta)
+
+
 def test_eight_rules_over_three_steps_by_hand() -> None:
     # alpha = 0.1, gamma = 0.9, lambda = 0.5, so gamma lambda = 0.45. Rules in the order LLL, LLH,
     # LHL, LHH, HLL, HLH, HHL, HHH; all theta are zero at first.
