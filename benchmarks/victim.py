@@ -167,7 +167,7 @@ class Adversary:
         shutil.copytree(self.sound, self.study)
 
 
-class Inline(Workers[Future[Outcome]]):
+class Inline(Workers):
     """Workers that are a thread of this process.
 
     Parameters

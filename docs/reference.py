@@ -117,8 +117,11 @@ def keys() -> Iterator[str]:
     yield "A preset is laid under the tables of a spec. `nested-agents presets NAME` prints it in"
     yield "full.\n"
     for name, preset in PRESETS.items():
-        yield f"### `{name}`\n\n{preset.summary[0].upper()}{preset.summary[1:]}.\n"
-        yield f"```toml\n{dumps(dict(preset.table)).strip()}\n```\n"
+        summary = preset["summary"]
+        yield f"### `{name}`\n\n{summary[0].upper()}{summary[1:]}.\n"
+        tables_of = {key: own for key, own in preset.items() if isinstance(own, dict)}
+        tables_of.pop("other_scenarios", None)
+        yield f"```toml\n{dumps(tables_of).strip()}\n```\n"
     yield "## Boxes, robots and state variables by name\n"
     yield f"Boxes: {', '.join(map(code, BOXES))}.\n"
     yield f"Robots: {', '.join(map(code, ROBOTS))}.\n"

@@ -11,9 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from nested_agents import Spec
-from nested_agents.studies.api.running import run_study
-from nested_agents.studies.results.results import read
+from nested_agents import Spec, run
 
 spec = Spec.of(
     {
@@ -30,8 +28,7 @@ spec = Spec.of(
 
 folder = tempfile.mkdtemp()
 if __name__ == "__main__":
-    with run_study(spec, Path(folder) / "carts", jobs=1) as store:
-        results = read(store)
+    results = run(spec, Path(folder) / "carts", jobs=1, progress=False).results
 
     figure, ax = plt.subplots(figsize=(6, 3), layout="constrained")
     for style, label in zip(("-", "--"), results.conditions, strict=True):

@@ -99,7 +99,7 @@ def parallel(
 def _arguments(kind: str, steps: int | None, options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments of an environment; further options are a ``[scenario]`` table."""
     from .core.interface.scenario import checked_scenario
-    from .core.plugins.settings import tuples
+    from .core.plugins.models import tuples
     from .scenarios import SCENARIOS
 
     own = {key: options[key] for key in ("by_agent", "render_mode") if key in options}

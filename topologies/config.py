@@ -21,8 +21,9 @@ from ..core.hierarchy.failures import AbsentAgents, AnyMessageFailure, LeftAgent
 from ..core.hierarchy.hierarchy import Communication, Hierarchy, Lookahead
 from ..core.numerics import nx
 from ..core.plugins import sources
-from ..core.plugins.registry import Plugged, SettingsRegistry
-from ..core.plugins.settings import PartSettings, SettingsError, changed_values, tuples
+from ..core.plugins.models import Plugged, tuples
+from ..core.plugins.registry import SettingsRegistry
+from ..core.plugins.settings import PartSettings, SettingsError, changed_values
 from ..core.plugins.words import closest, expect, expect_each
 from ..core.search.coordination_graphs import orient
 from .builders import Bodies, Names, check_names, from_networkx, quote

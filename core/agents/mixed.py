@@ -20,7 +20,7 @@ from ..hierarchy.stages import communication_levels
 from ..interface.scenario import Scenario
 from ..learners import LEARNERS
 from ..learners.learner import MembersOf, TeamSettings
-from ..plugins.registry import Plugged
+from ..plugins.models import Plugged
 from ..plugins.settings import Names, Settings
 from .joint import body_of
 

@@ -26,7 +26,7 @@ from pydantic import Field
 from ..interface.agents import Counts
 from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics import FloatArray, IntArray
-from ..plugins.registry import Plugged
+from ..plugins.models import Plugged
 from ..plugins.settings import Positive
 from ..search.evaluator import DecisionContext, Evaluator
 from ..search.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings

@@ -18,7 +18,7 @@ from ..models.calibration import CalibrationSettings
 from ..models.predictors import GivenPredictor, PosePredictorSettings, Predictor
 from ..models.self_model import SelfModelSettings
 from ..numerics import FloatArray, IntArray
-from ..plugins.registry import Plugged
+from ..plugins.models import Plugged
 from ..plugins.settings import PartSettings
 from ..search.exploration import (
     EXPLORATIONS,

@@ -9,13 +9,11 @@ from __future__ import annotations
 import re
 import typing
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails
 
-from .models import Slot, annotation_of, field_of, kind_of, kinds_at, model_at, models_of
+from .models import Slot, annotation_of, field_of, kind_of, model_at, models_of, plug_at
 from .words import closest, near, shallowest, show
 
 Keys = tuple[int | str, ...]
@@ -75,25 +73,6 @@ def mistaken(key: object, known: Collection[str], problem: str) -> str:
     return f"; {hint}" if hint else ""
 
 
-class Complaint(NamedTuple):
-    """One error of pydantic."""
-
-    keys: Keys
-    """Path in the table."""
-    details: ErrorDetails
-    """The error as pydantic reports it."""
-
-    @property
-    def path(self) -> str:
-        """The path as text."""
-        return dotted(self.keys)
-
-
-def problems_of(error: ValidationError, table: Table) -> list[Complaint]:
-    """Return the errors of pydantic about a table."""
-    return [Complaint(place(e["loc"], table), e) for e in error.errors(include_url=False)]
-
-
 def place(loc: Sequence[int | str], data: object) -> Keys:
     """Return a path of pydantic without parts that name members of unions."""
     keys: list[int | str] = []
@@ -144,76 +123,58 @@ def explain(
     swept_in
         Name of the table of swept values; empty if there is none.
     """
-    problems = problems_of(error, table)
+    problems = [(place(e["loc"], table), e) for e in error.errors(include_url=False)]
     # Where a name or a table may stand and a table does, what is wrong is in the table.
-    start = problems[0].keys
-    inside = [p for p in problems if len(p.keys) > len(start) and p.keys[: len(start)] == start]
-    problem = (inside or problems)[0]
-    kind_of_problem = problem.details["type"]
-    if kind_of_problem == "extra_forbidden":
-        return _on_unknown_key(problem, model, table, outer or (model, table))
-    if kind_of_problem == "missing":
-        name = problem.details["loc"][-1]
-        is_there = problem.keys[-1:] == (name,) or isinstance(name, int)
-        return f"{problem.path if is_there else dotted((*problem.keys, name))}: missing"
-    if kind_of_problem == "plugged_kind":
-        kind = entry(problem.details["input"], "kind")
-        hint = several((*problem.keys, "kind"), kind, "", swept_in)
-        return f"{_on_kind(problem)}{problem.details['msg']}{hint}"
-    if kind_of_problem.startswith("union_tag"):
-        return _on_unknown_kind(problem, model, table)
+    start, _ = problems[0]
+    inside = [p for p in problems if len(p[0]) > len(start) and p[0][: len(start)] == start]
+    keys, details = (inside or problems)[0]
+    path = dotted(keys)
+    value = details["input"]
+    kind = entry(value, "kind")
+    if details["type"] == "missing":
+        name = details["loc"][-1]
+        is_there = keys[-1:] == (name,) or isinstance(name, int)
+        return f"{path if is_there else dotted((*keys, name))}: missing"
+    if details["type"] == "plugged_kind":
+        hint = several((*keys, "kind"), kind, "", swept_in)
+        return f"{_on_kind(path, value)}{details['msg']}{hint}"
+    if details["type"].startswith("union_tag"):
+        slot, _ = _reach(keys, model, table)
+        kinds = map(kind_of, models_of(annotation_of(slot)))
+        hint = closest(kind, [known for known in kinds if known])
+        return f"{_on_kind(path, value)}{hint}{_pointer(keys, kind, model, table)}"
     # The members of a union complain one by one about the same place: say what any would take.
-    same = [p for p in problems if p.keys == problem.keys]
-    text = ", or ".join(dict.fromkeys(rule(p.details["msg"]) for p in same))
-    return _on_value(problem, text, model, table, swept_in)
-
-
-def _on_unknown_key(
-    problem: Complaint,
-    model: type[BaseModel],
-    table: Table,
-    outer: tuple[type[BaseModel], Table],
-) -> str:
-    key = problem.keys[-1]
-    owner = model_at(*_reach(problem.keys[:-1], model, table))
-    kind = kind_of(owner) if owner is not None else None
-    known = set() if owner is None else set(owner.model_fields)
-    misspelt = near(key, known, cutoff=0.85)
-    hint = misspelt or misplaced(problem.path, *outer) or closest(key, known)
-    of_kind = f" for kind {kind!r}" if kind else ""
-    return f"{problem.path} = {show(problem.details['input'])}: unknown key{of_kind}; {hint}"
-
-
-def _on_kind(problem: Complaint) -> str:
-    """Return the beginning of a line about the kind of a table."""
-    value = problem.details["input"]
-    if isinstance(value, Mapping) and "kind" in value:
-        return f"{problem.path}.kind = {show(value['kind'])}: "
-    return f"{problem.path} = {show(value)}: " + "kind is missing; " * isinstance(value, Mapping)
-
-
-def _on_unknown_kind(problem: Complaint, model: type[BaseModel], table: Table) -> str:
-    slot, _ = _reach(problem.keys, model, table)
-    kinds = map(kind_of, models_of(annotation_of(slot)))
-    kind = problem.details["input"].get("kind")
-    hint = closest(kind, [known for known in kinds if known])
-    return f"{_on_kind(problem)}{hint}{_pointer(problem.keys, kind, model, table)}"
-
-
-def _on_value(
-    problem: Complaint, text: str, model: type[BaseModel], table: Table, swept_in: str
-) -> str:
-    if not problem.keys:
+    same = [details["msg"] for own, details in problems if own == keys]
+    text = ", or ".join(dict.fromkeys(map(rule, same)))
+    if not keys:
         return text
-    value = problem.details["input"]
-    owner = model_at(*_reach(problem.keys[:-1], model, table))
+    owner = model_at(*_reach(keys[:-1], model, table))
+    if details["type"] == "extra_forbidden":
+        return f"{path} = {show(value)}: {_on_unknown_key(keys, owner, outer or (model, table))}"
     is_other_type = ("string" in text) is not isinstance(value, str)
     hint = ""
     if owner is not None and is_other_type:
-        hint = mistaken(problem.keys[-1], owner.model_fields, problem.details["type"])
-    hint = hint or _pointer(problem.keys, value, model, table)
-    hint = hint or several(problem.keys, value, text, swept_in)
-    return f"{problem.path} = {show(value)}: {text}{hint}"
+        hint = mistaken(keys[-1], owner.model_fields, details["type"])
+    hint = hint or _pointer(keys, value, model, table) or several(keys, value, text, swept_in)
+    return f"{path} = {show(value)}: {text}{hint}"
+
+
+def _on_unknown_key(
+    keys: Keys, owner: type[BaseModel] | None, outer: tuple[type[BaseModel], Table]
+) -> str:
+    known = set() if owner is None else set(owner.model_fields)
+    kind = kind_of(owner) if owner is not None else None
+    misspelt = near(keys[-1], known, cutoff=0.85)
+    hint = misspelt or misplaced(dotted(keys), *outer) or closest(keys[-1], known)
+    of_kind = f" for kind {kind!r}" if kind else ""
+    return f"unknown key{of_kind}; {hint}"
+
+
+def _on_kind(path: str, value: object) -> str:
+    """Return the beginning of a line about the kind of a table."""
+    if isinstance(value, Mapping) and "kind" in value:
+        return f"{path}.kind = {show(value['kind'])}: "
+    return f"{path} = {show(value)}: " + "kind is missing; " * isinstance(value, Mapping)
 
 
 def several(keys: Keys, value: object, text: str, swept_in: str) -> str:
@@ -282,10 +243,10 @@ def _held(field: FieldInfo, table: object) -> Sequence[type[BaseModel]]:
     own = model_at(field, table)
     if own is not None:
         return [own]
-    kinds = kinds_at(field)
-    if kinds is None:
+    plug = plug_at(field)
+    if plug is None:
         return models_of(field.annotation)
-    return [kinds.model(kind) for kind in kinds.built_in()]
+    return [plug.model(kind) for kind in plug.registry.built_in]
 
 
 def _reach(keys: Keys, model: type[BaseModel], table: Table) -> tuple[Slot, object]:

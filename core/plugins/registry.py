@@ -14,32 +14,20 @@ the settings as its annotated keyword-only parameters; its docstring documents t
 
 from __future__ import annotations
 
-import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from contextvars import ContextVar
+from collections.abc import Callable, Mapping
 from functools import cache
 from inspect import getdoc, signature
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
-from pydantic import (
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    SerializationInfo,
-    ValidationInfo,
-    create_model,
-)
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic import Field, create_model
 
 from . import sources
-from .models import Kinds
 from .origin import checked_origin
-from .settings import PartSettings, Settings, tuples
+from .settings import PartSettings, Settings
 from .trust import module_named
 from .words import closest
 
@@ -50,16 +38,8 @@ MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
 """A parameter in a docstring: its name, and its indented description."""
 
 
-def _folders() -> tuple[tuple[str, int], ...]:
-    """Return the folders of packages, and the time of the last installation in each [ns]."""
-    places = map(os.path.abspath, sys.path)  # "" is where the process is
-    return tuple((place, os.stat(place).st_mtime_ns) for place in places if os.path.exists(place))
-
-
 @cache
-def _offered(
-    entry_points: Callable[..., EntryPoints], group: str, folders: tuple[tuple[str, int], ...]
-) -> tuple[EntryPoint, ...]:
+def _offered(entry_points: Callable[..., EntryPoints], group: str) -> tuple[EntryPoint, ...]:
     """Return the entry points of a group; cached, because hundreds of packages are read."""
     return tuple(entry_points(group=group))
 
@@ -111,7 +91,7 @@ class Registry:
         from importlib.metadata import entry_points
 
         places: dict[str, str] = {}
-        for point in _offered(entry_points, self.group, _folders()):
+        for point in _offered(entry_points, self.group):
             known = self.built_in.get(point.name) or places.get(point.name)
             if known is not None and known != point.value:
                 raise ValueError(f"{point.name!r} is offered twice: {known}, {point.value}")
@@ -319,82 +299,3 @@ def _parameters(thing: Callable[..., Any]) -> dict[str, Any]:
             of_type = cast(Any, Annotated)[type_, Field(description=meanings.get(p.name))]
             fields[p.name] = of_type, ... if p.default is p.empty else p.default
     return fields
-
-
-_described: ContextVar[tuple[Registry, ...]] = ContextVar("registries", default=())
-"""Registries with a JSON schema that is being written."""
-
-
-def _dump(value: Settings, info: SerializationInfo) -> dict[str, object]:
-    """Dump settings like the model that holds them."""
-    return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
-
-
-class Plugged(Kinds):
-    """Mark of a field that holds the settings of any thing of a registry.
-
-    A table is validated by the model of its ``kind``, text is converted by `shorthand`, and
-    settings are kept.
-
-    Parameters
-    ----------
-    registry
-        The registry.
-    shorthand
-        Converts text to settings. By default, a table is required.
-    """
-
-    def __init__(
-        self, registry: SettingsRegistry, shorthand: Callable[[str], Settings] | None = None
-    ) -> None:
-        self.registry = registry
-        self.shorthand = shorthand
-
-    def model(self, kind: str) -> type[Settings]:
-        """Return the settings model of a kind, see `SettingsRegistry.model`."""
-        return self.registry.model(kind)
-
-    def built_in(self) -> Iterable[str]:
-        """Return the kinds that are built in."""
-        return self.registry.built_in
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> core_schema.CoreSchema:
-        """Return the pydantic schema of the field."""
-        return core_schema.with_info_plain_validator_function(
-            self._validate,
-            serialization=core_schema.plain_serializer_function_ser_schema(_dump, info_arg=True),
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """Return the JSON schema: a table of a built-in kind, any other table, or a text."""
-        names = list(self.registry.built_in)
-        other = {"type": "object", "properties": {"kind": {"not": {"enum": names}}}}
-        tables: list[JsonSchemaValue] = [other, {"type": "string"}]
-        if self.registry not in _described.get():  # a team inside a team is not described again
-            token = _described.set((*_described.get(), self.registry))
-            for name in reversed(names):
-                model = self.registry.model(name)
-                model.model_rebuild()
-                tables.insert(0, handler(model.__pydantic_core_schema__))
-            _described.reset(token)
-        return {"title": self.registry.kind, "anyOf": tables}
-
-    def _validate(self, value: object, info: ValidationInfo) -> Settings:
-        if isinstance(value, Settings):
-            return value
-        if isinstance(value, str) and self.shorthand is not None:
-            return self.shorthand(value)
-        if not isinstance(value, Mapping):
-            words = "a name or a table" if self.shorthand is not None else "a table"
-            raise PydanticCustomError("table", f"must be {words}")
-        try:
-            model = self.registry.model(str(value.get("kind", "")))
-        except ValueError as error:
-            raise PydanticCustomError(
-                "plugged_kind", "{message}", {"message": str(error)}
-            ) from None
-        return model.model_validate(tuples(value), strict=True, context=info.context)

@@ -305,12 +305,3 @@ class ScenarioSettings(PartSettings):
     def onset(self) -> int | None:
         """Episode in which the first failure begins; None without failures."""
         return min((begin for begin, _ in self.failure_spans), default=None)
-
-
-def tuples(value: Any) -> Any:
-    """Return `value` with tuples instead of lists, as strict validation requires."""
-    if isinstance(value, Mapping):
-        return {key: tuples(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return tuple(tuples(inner) for inner in value)
-    return value

@@ -22,13 +22,13 @@ from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..isolation import same_folder
 from .compiled import compiled_name
 from .printing import printable
 from .syntax import imported
-from .trust import is_trusted, module_text, place_of, sha256, trust
+from .trust import is_trusted, module_text, place_of, sha256, texts_in, trust
 
 ZIPPED = b"PK"
 """First bytes of a zip file."""
@@ -42,19 +42,9 @@ GRAPHS = (".graphml", ".json", ".toml")
 """Suffixes of files that hold a hierarchy."""
 
 
-class Checkpoints(NamedTuple):
-    """Checkpoints of the trials of a study, from which killed trials resume."""
-
-    folder: Path
-    """Folder with one file per trial."""
-    seconds: float
-    """Interval between checkpoints [s]."""
-    code: str
-    """Digest of the code and libraries. With another digest, a trial starts from the beginning."""
-
-    def file(self, identity: str) -> Path:
-        """Return the file of a trial."""
-        return self.folder / f"{identity}.npz"
+Checkpoints = tuple[Path, float, str]
+"""Folder of the checkpoints from which killed trials resume, interval between checkpoints [s], and
+digest of the code and libraries; with another digest, a trial starts from the beginning."""
 
 
 class Sources:
@@ -307,7 +297,7 @@ def is_file(text: object) -> bool:
     return isinstance(text, str) and text.lower().endswith(GRAPHS)
 
 
-def mentions(value: object, key: str = "") -> Iterator[tuple[str, str]]:
+def mentions(value: object) -> Iterator[tuple[str, str]]:
     """Yield the files that settings mention, at any depth, each with the dotted key that does.
 
     Examples
@@ -315,16 +305,11 @@ def mentions(value: object, key: str = "") -> Iterator[tuple[str, str]]:
     >>> list(mentions({"kind": "arm.py:Arm", "graphs": ["teams.json"]}))
     [('arm.py', 'kind'), ('teams.json', 'graphs')]
     """
-    if isinstance(value, Mapping):
-        for name, inner in value.items():
-            yield from mentions(inner, f"{key}.{name}".lstrip("."))
-    elif isinstance(value, list | tuple):
-        for inner in value:
-            yield from mentions(inner, key)
-    elif isinstance(value, str) and is_reference(value):
-        yield split(value)[0], key
-    elif isinstance(value, str) and (is_file(value) or value.endswith(TEAMS)):
-        yield value, key
+    for text, key in texts_in(value):
+        if is_reference(text):
+            yield split(text)[0], key
+        elif is_file(text) or text.endswith(TEAMS):
+            yield text, key
 
 
 def files_in(value: object) -> set[str]:

@@ -105,7 +105,19 @@ def is_module_name(text: str) -> bool:
     return all(part.isidentifier() for part in text.split("."))
 
 
-def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
+def texts_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the texts in settings, at any depth, each with its dotted key."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from texts_in(inner, f"{key}.{name}".lstrip("."))
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from texts_in(inner, key)
+    elif isinstance(value, str):
+        yield value, key
+
+
+def modules_in(value: object) -> Iterator[tuple[str, str]]:
     """Yield the modules that settings name, at any depth, each with its dotted key.
 
     A kind names its module with a dot in it, so that ``"chain:reversed"`` names none. Modules of
@@ -117,17 +129,11 @@ def modules_in(value: object, key: str = "") -> Iterator[tuple[str, str]]:
     >>> list(modules_in({"kind": "arms.seven:Arm", "id": "games/chess", "of": "arm.py:Arm"}))
     [('arms.seven', 'kind'), ('games.chess', 'id')]
     """
-    if isinstance(value, Mapping):
-        for name, inner in value.items():
-            yield from modules_in(inner, f"{key}.{name}".lstrip("."))
-    elif isinstance(value, list | tuple):
-        for inner in value:
-            yield from modules_in(inner, key)
-    elif isinstance(value, str):
-        module = module_named(value)
+    for text, key in texts_in(value):
+        module = module_named(text)
         if key.rpartition(".")[2] in ENVIRONMENT_KEYS:
-            path = value.replace("/", ".")
-            if not module and is_module_name(path) and not value.endswith(".py"):
+            path = text.replace("/", ".")
+            if not module and is_module_name(path) and not text.endswith(".py"):
                 module = path
             if module and module.partition(".")[0] not in LIBRARIES:
                 yield module, key

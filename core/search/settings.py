@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..plugins.registry import Plugged
+from ..plugins.models import Plugged
 from ..plugins.settings import Settings
 from . import EVALUATORS, EvaluatorSettings
 from .enumeration import AutoSettings

@@ -13,7 +13,7 @@ from html import escape
 from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from ...core.interface.measures import RETURN, SUCCESS
 from ...core.numerics import pd
@@ -45,13 +45,6 @@ Place = str | PathLike[str]
 """Path of a directory or a file."""
 
 
-class Defaults(NamedTuple):
-    """Default arguments of `StudyResults.compare`."""
-
-    measure: str | None = None
-    by: str | None = None
-
-
 @dataclass(frozen=True)
 class StudyData:
     """Results of the finished trials of one or several studies.
@@ -75,7 +68,8 @@ class StudyData:
     _tables: Mapping[str, SpecTable] = field(default_factory=dict, repr=False)
     """Specs of several studies by name, if these are not parts of one."""
     _is_whole: bool = True
-    _defaults: Defaults = field(default_factory=Defaults)
+    _defaults: tuple[str | None, str | None] = (None, None)
+    """Measure and key that `compare` uses by default."""
 
     @property
     def conditions(self) -> tuple[str, ...]:
@@ -167,9 +161,10 @@ class StudyData:
         SpecError
             If there is no such key, measure, phase or reference.
         """
-        by = by or self._defaults.by
+        default_measure, default_by = self._defaults
+        by = by or default_by
         key = None if by == "condition" else by
-        name = measure or self._defaults.measure or self.results.main.name
+        name = measure or default_measure or self.results.main.name
         compared = compare_conditions(self.results, name, phase, key, reference)
         missing = missing_reference(self.results) if reference is None and key is None else []
         return Comparison(compared, (*missing, *self._of_controls, *self.remarks))

@@ -89,31 +89,25 @@ def scaling_law(
 
 
 def _method_remarks(study: StudyResults, results: Results, size: str | None) -> tuple[str, ...]:
-    """Return a sentence for each group of conditions in which the search method changes with size.
+    """Return a sentence if the search method of a group of conditions changes with size.
 
     A team of each condition is built to find its method. A study with untrusted files, or one that
     is known by its table alone, has no methods.
     """
     axis = SizeAxis.of(results, size)
-    groups: dict[str, list[tuple[float, str]]] = {}
+    smallest: dict[tuple[str, str], float] = {}
     for condition, settings in study.condition_settings().items():
         if condition in axis.places:
             group, n = axis.places[condition]
             with study._sources.active(), suppress(ValueError, ImportError):
-                method = search_method(arrange(settings, 0).team)
-                groups.setdefault(group, []).append((n, method))
-    changes: dict[str, list[str]] = {}
-    for group, members in groups.items():
-        first = {method: n for n, method in sorted(members, reverse=True)}
-        steps = sorted((n, method) for method, n in first.items())
-        if len(steps) > 1:
-            text = ", ".join(f"{method} from {n:g} {axis.name}" for n, method in steps)
-            changes.setdefault(text, []).append(group)
-    remarks = []
-    for text, own in changes.items():
-        head = "" if len(own) == len(groups) else f"{', '.join(own)}: "
-        remarks.append(
-            f"{head}The search method changes within the sizes ({text}), so that one law describes "
-            "several methods; learner.decision.evaluator sets one for all."
-        )
-    return tuple(remarks)
+                key = group, search_method(arrange(settings, 0).team)
+                smallest[key] = min(n, smallest.get(key, n))
+    groups = [group for group, _ in smallest]
+    steps = sorted((n, *key) for key, n in smallest.items() if groups.count(key[0]) > 1)
+    changes = dict.fromkeys(f"{method} from {n:g} {axis.name}" for n, _, method in steps)
+    if not changes:
+        return ()
+    return (
+        f"The search method changes within the sizes ({', '.join(changes)}), so that one law "
+        "describes several methods; learner.decision.evaluator sets one for all.",
+    )

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TypedDict, Unpack, get_args
+from typing import get_args
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
@@ -14,7 +14,7 @@ from ...core.plugins.words import closest, expect, expect_each
 from ..errors import SpecError, refused
 from ..results import published
 from ..results.exported import is_exported, read_export
-from ..results.foreign_tables import columns_by_role, parse_roles, read_scores
+from ..results.foreign_tables import ROLES, columns_by_role, parse_roles, read_scores
 from ..results.joining import combine, join_parts
 from ..results.json_files import read_json
 from ..results.marl_eval import Runs, is_exported_by, read_runs, results_of_runs
@@ -26,7 +26,7 @@ from ..spec.tables import SpecTable, TomlTable
 from ..store.durable import read_text
 from ..store.store import Store
 from .comparison import Comparison
-from .data import Defaults, Place
+from .data import Place
 from .study import StudyResults
 
 Roles = Mapping[str, str | Sequence[str]]
@@ -65,25 +65,13 @@ def load(*places: Place, columns: Sequence[str] = (), better: Better | None = No
     paths = [Path(place) for place in places]
     _check_distinct(paths)
     roles = parse_roles(columns)
-    opened = [_open(path) for path in paths]
-    if roles and not any(isinstance(own, ScoreTable) for own in opened):
+    opened = {path: _open(path) for path in paths}
+    if roles and not any(isinstance(own, ScoreTable) for own in opened.values()):
         raise SpecError(f"columns: are of tables, {', '.join(SUFFIXES)}")
-    if better is not None and all(isinstance(own, StudyResults) for own in opened):
+    if better is not None and all(isinstance(own, StudyResults) for own in opened.values()):
         raise SpecError("better: is of results of other tools; a study knows what is better")
-    loaded = _results_of(paths, opened, roles, better or "higher")
-    if len(loaded) == 1:
-        return next(iter(loaded.values()))
-    return _merge(list(loaded), list(loaded.values()))
-
-
-class RoleColumns(TypedDict, total=False):
-    """RoleColumns of a table of scores, by role; see `foreign_tables.ROLES`."""
-
-    condition: str | Sequence[str]
-    score: str | Sequence[str]
-    seed: str | None
-    item: str | None
-    step: str | None
+    loaded = _results_of(opened, roles, better or "higher")
+    return _merge(loaded) if len(loaded) > 1 else next(iter(loaded.values()))
 
 
 def compare_table(
@@ -94,7 +82,7 @@ def compare_table(
     measure: str | None = None,
     phase: str | None = None,
     reference: str | None = None,
-    **columns: Unpack[RoleColumns],
+    **columns: str | Sequence[str] | None,
 ) -> Comparison:
     """Compare conditions by a table of scores of any tool.
 
@@ -134,25 +122,18 @@ def compare_table(
     expect("a table of pandas or the path of a file", pd.DataFrame | str | PathLike, table=table)
     if better not in get_args(Better):
         raise SpecError(f"better = {better!r}, allowed: {' or '.join(get_args(Better))}")
-    condition, score = columns.get("condition", ()), columns.get("score", ())
-    expect_each("names of columns", str, condition=condition, score=score)
-    roles = _roles(columns)
+    for role in columns:
+        if role not in ROLES:
+            raise TypeError(f"compare_table: unknown argument {role!r}; {closest(role, ROLES)}")
+    roles = {role: column for role, column in columns.items() if column is not None}
+    expect("names of columns", Sequence, **roles)
+    expect_each("names of columns", str, **roles)
     if isinstance(table, pd.DataFrame):
         results = _of_table(table_of(table), None, roles, better)
     else:
         path = Path(table)
-        results = _results_of([path], [_open(path)], roles, better)[path]
+        results = _results_of({path: _open(path)}, roles, better)[path]
     return results.compare(by, measure, phase=phase, reference=reference)
-
-
-def _roles(columns: RoleColumns) -> Roles:
-    """Return the roles that are given; an unknown one is refused."""
-    known = RoleColumns.__annotations__
-    for role in columns:
-        if role not in known:
-            raise TypeError(f"compare_table: unknown argument {role!r}; {closest(role, known)}")
-    given = {role: columns.get(role) for role in known}
-    return {r: c for r, c in given.items() if isinstance(c, str | Sequence)}
 
 
 Opened = StudyResults | ScoreTable | Runs
@@ -195,15 +176,15 @@ def _sources_beside(path: Path | None) -> Sources:
 
 
 def _results_of(
-    paths: Sequence[Path], opened: Sequence[Opened], roles: Roles, better: Better
+    opened: Mapping[Path, Opened], roles: Roles, better: Better
 ) -> dict[Path, StudyResults]:
     """Return the results of what paths hold; runs of several files are put together."""
-    runs = {path: own for path, own in zip(paths, opened, strict=True) if isinstance(own, dict)}
+    runs = {path: own for path, own in opened.items() if isinstance(own, dict)}
     joined = {name: rows for own in runs.values() for name, rows in own.items()}
     if len(runs) > 1 and len(joined) == sum(map(len, runs.values())):
         runs = {next(iter(runs)): joined}
     loaded: dict[Path, StudyResults] = {}
-    for path, own in zip(paths, opened, strict=True):
+    for path, own in opened.items():
         if isinstance(own, StudyResults):
             loaded[path] = own
         elif isinstance(own, ScoreTable):
@@ -267,37 +248,31 @@ def _of_scores(
         notes = (*header.remarks(path), *notes)
     remarks = tuple(f"{path}: {line}" if path else line for line in notes)
     sources = _sources_beside(path)
-    return StudyResults(
-        outline, results, (), remarks, sources, _defaults=Defaults(measure, read.by)
-    )
+    return StudyResults(outline, results, (), remarks, sources, _defaults=(measure, read.by))
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:
     """Refuse paths of which two are the same place."""
-    known = set[str]()
-    for path in paths:
-        place = os.path.realpath(path)
-        if place in known:
+    places = list(map(os.path.realpath, paths))
+    for k, path in enumerate(paths):
+        if places[k] in places[:k]:
             raise SpecError(f"{path}: is named more than once")
-        known.add(place)
 
 
-def _merge(paths: Sequence[Path], studies: Sequence[StudyResults]) -> StudyResults:
+def _merge(loaded: Mapping[Path, StudyResults]) -> StudyResults:
     """Return the results of several studies, or of parts of one, as those of one."""
+    studies = list(loaded.values())
     whole = join_parts([(study.outline, study.results) for study in studies])
     tables = dict[str, SpecTable]()
     if whole is not None:
         outline, results = whole
         labels = [{c: c for c in results.columns}] * len(studies)
     else:
-        names = [path.name for path in paths]
-        if len(set(names)) < len(names):
-            names = list(map(str, paths))
-        results, labels = combine(
-            [(name, study.results) for name, study in zip(names, studies, strict=True)]
-        )
+        is_named = len({path.name for path in loaded}) == len(loaded)
+        named = {path.name if is_named else str(path): own for path, own in loaded.items()}
+        results, labels = combine([(name, study.results) for name, study in named.items()])
         outline = studies[0].outline._replace(columns=results.columns)
-        tables = {n: study.outline.table for n, study in zip(names, studies, strict=True)}
+        tables = {name: study.outline.table for name, study in named.items()}
     settings = dict[str, TomlTable]()
     failed = list[tuple[str, int, str]]()
     for study, new in zip(studies, labels, strict=True):

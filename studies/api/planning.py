@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from textwrap import wrap
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
@@ -38,15 +37,6 @@ TIME_RANGE = (0.3, 3.0)
 """Lower and upper end of the range of times, as fractions of the estimate."""
 START_S = 3.0
 """Time in which a command and its workers start [s]."""
-
-
-class PilotCost(NamedTuple):
-    """Cost of one condition, extrapolated from its pilot episodes."""
-
-    seconds: float
-    """Time of one trial [s]."""
-    startup: float
-    """Time to build and compile what the first step needs, once per process [s]."""
 
 
 @dataclass(frozen=True)
@@ -161,8 +151,8 @@ def plan(
     if timed:
         with spec.sources.active():
             costs = [pilot(trial) for trial in trials[:n_conditions]]
-        training = len(spec.seeds) * sum(cost.seconds for cost in costs) / processes
-        seconds = START_S + sum(cost.startup for cost in costs) + training
+        training = len(spec.seeds) * sum(trial for trial, _ in costs) / processes
+        seconds = START_S + sum(startup for _, startup in costs) + training
     return Plan(
         outline=StudyOutline.of(spec),
         trials=len(trials),
@@ -176,8 +166,15 @@ def plan(
     )
 
 
-def pilot(trial: Trial) -> PilotCost:
-    """Run pilot episodes of a trial and return its extrapolated cost."""
+def pilot(trial: Trial) -> tuple[float, float]:
+    """Run pilot episodes of a trial and extrapolate its cost.
+
+    Returns
+    -------
+    tuple
+        Time of the trial, and time to build and compile what the first step needs, once per
+        process [s].
+    """
     max_steps = max(2, MAX_AGENT_STEPS // len(trial.world().agents))
     longest = trial.evaluation_steps or trial.steps
     short = replace(
@@ -207,7 +204,7 @@ def pilot(trial: Trial) -> PilotCost:
     if rows:
         share = longest / max(row.steps for row in rows) if longest > max_steps else 1.0
         seconds += n_evaluations * share * (evaluated - trained)
-    return PilotCost(seconds, compiled - start)
+    return seconds, compiled - start
 
 
 def _train(session: Session, done: int) -> int:

@@ -12,18 +12,12 @@ fault. A seed that does not recover counts with all the episodes that were run: 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple, Protocol, TypeAlias, TypedDict, Unpack, runtime_checkable
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...core.numerics import FloatArray
-from ...scenarios.faults.wrappers import (
-    ActuatorFault,
-    Commands,
-    FaultyEnv,
-    FaultyParallelEnv,
-    Mechanism,
-)
+from ...scenarios.faults.wrappers import ActuatorFault, FaultyEnv, FaultyParallelEnv
 from ...scenarios.library_types import Data, Environment
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
@@ -31,34 +25,10 @@ from ..results.analysis import Summary
 from ..results.recovery import BLOCK, REGAINED, recovery
 from ..results.statistics import bootstrap, exactly, rate
 
-
-@runtime_checkable
-class Model(Protocol):
-    """A trained model, as those of stable-baselines3; it is asked without exploration."""
-
-    def predict(self, observation: Data, *, deterministic: bool) -> tuple[Data, object]:
-        """Return an action, and a state that is not used."""
-
-
-@runtime_checkable
-class Begins(Protocol):
-    """Policy that is notified when a run begins, with or without faults."""
-
-    def begin(self, seed: int) -> None:
-        """Start the random numbers of a run."""
-
-
-Policy: TypeAlias = Model | Begins | Callable[[Data], Data]
-"""Policy: a model, or a function that returns the action for an observation, or for observations by
-agent. It may also be one that `Begins`."""
-
-
-class Wrapping(TypedDict, total=False):
-    """Further arguments of `FaultyEnv`."""
-
-    commands: Commands
-    mechanism: Mechanism
-    inform: bool
+Policy: TypeAlias = Any
+"""Policy: a function that returns the action for an observation, or for observations by agent; or a
+trained model with a method `predict` such as those of stable-baselines3, which is asked without
+exploration."""
 
 
 class RandomPolicy:
@@ -145,11 +115,6 @@ class RecoveryTable(Report):
         return tabulate([course.summary() for course in self.courses])
 
     @property
-    def tables(self) -> tuple[SummaryTable]:
-        """The table of policies and schedules."""
-        return (self.table,)
-
-    @property
     def notes(self) -> tuple[str]:
         """Meaning of the columns."""
         return (f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes.",)
@@ -163,7 +128,7 @@ def recovery_table(
     seeds: int | Sequence[int] = 5,
     episodes: int = 20,
     steps: int = 1000,
-    **wrapping: Unpack[Wrapping],
+    **wrapping: Any,
 ) -> RecoveryTable:
     """Run policies through schedules of faults, paired with the same runs without.
 
@@ -224,7 +189,7 @@ def returns(
     seed: int,
     episodes: int,
     steps: int,
-    **wrapping: Unpack[Wrapping],
+    **wrapping: Any,
 ) -> FloatArray:
     """Return the returns ``(episodes,)`` of one run; see `recovery_table`."""
     bare = make()
@@ -232,7 +197,7 @@ def returns(
     wrap: Callable[..., Environment] = FaultyParallelEnv if is_parallel else FaultyEnv
     env = wrap(bare, faults, **wrapping)
     act = _function_of(policy)
-    if isinstance(policy, Begins):
+    if isinstance(policy, RandomPolicy):
         policy.begin(seed)
     totals = np.zeros(episodes)
     for episode, world in enumerate(np.random.SeedSequence(seed).generate_state(episodes)):
@@ -252,16 +217,18 @@ def returns(
 
 
 def _function_of(policy: Policy) -> Callable[[Data], Data]:
-    if isinstance(policy, Model):
-        return partial(_predict, policy)
-    if callable(policy):
-        return policy
-    raise ValueError(f"policy = {policy!r:.60}: must be a function, or have a method predict")
+    try:
+        return partial(_predict, policy.predict)
+    except AttributeError:
+        if callable(policy):
+            return policy
+        what = "must be a function, or have a method predict"
+        raise ValueError(f"policy = {policy!r:.60}: {what}") from None
 
 
-def _predict(model: Model, observation: Data) -> Data:
+def _predict(predict: Callable[..., tuple[Data, object]], observation: Data) -> Data:
     """Return the action of a model; of observations by agent, those of each apart."""
     if isinstance(observation, Mapping):
-        return {agent: _predict(model, own) for agent, own in observation.items()}
-    action, _ = model.predict(observation, deterministic=True)
+        return {agent: _predict(predict, own) for agent, own in observation.items()}
+    action, _ = predict(observation, deterministic=True)
     return action

@@ -1,6 +1,6 @@
 """Trained teams of a study, evaluated with lost agents or actuators."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ..errors import SpecError, refused
@@ -9,7 +9,6 @@ from ..resilience.losses import losable_team, loss_sets, next_number, with_loss
 from ..resilience.report import ResilienceReport
 from ..results.comparison import title_of, values_by_seed
 from ..results.results import Results
-from ..spec.conditions import ConditionSettings
 from ..store.database import EVALUATION
 from ..trials.trial import Trial
 from .kept_teams import KeptTeams
@@ -48,36 +47,20 @@ def measure_resilience(
         while open_teams := [
             own for own in able if own.halving is None and n_lost < len(own.units)
         ]:
-            sets = {
-                own.condition: loss_sets(len(own.units), n_lost, max_sets) for own in open_teams
-            }
-            losses = {
-                own.condition: [[own.units[i] for i in units] for units in sets[own.condition]]
-                for own in open_teams
-            }
-            evaluated = evaluate(_trials_with_losses(kept, fault, losses))
-            for own in open_teams:
-                for k, units in enumerate(sets[own.condition]):
+            sets = [loss_sets(len(own.units), n_lost, max_sets) for own in open_teams]
+            losses = {}
+            for own, lost in zip(open_teams, sets, strict=True):
+                named = ([own.units[i] for i in units] for units in lost)
+                each = (with_loss(settings[own.condition], fault, units) for units in named)
+                losses[own.condition] = tuple((str(k), other) for k, other in enumerate(each))
+            open_trials = (trial for trial in kept.trials if trial.condition in losses)
+            evaluated = evaluate(
+                [replace(trial, evaluations=losses[trial.condition]) for trial in open_trials]
+            )
+            for own, lost in zip(open_teams, sets, strict=True):
+                for k, units in enumerate(lost):
                     entry = f"{EVALUATION}{k}"
                     own.lost[units] = evaluated.by_seed(own.condition, entry, shown_as.name)
             n_lost = next_number(n_lost)
     left_out = tuple(own.condition for own in teams if own.intact_mean <= 0.0)
     return ResilienceReport(Resilience(fault, shown_as, title, tolerance, able, left_out))
-
-
-def _trials_with_losses(
-    kept: KeptTeams, fault: str, losses: Mapping[str, Sequence[Sequence[str]]]
-) -> list[Trial]:
-    """Return the trials of conditions, each with a further evaluation for every set of units."""
-    evaluations: dict[str, tuple[tuple[str, ConditionSettings], ...]] = {}
-    trials = []
-    for trial in kept.trials:
-        label = trial.condition
-        if label in losses:
-            if label not in evaluations:
-                evaluations[label] = tuple(
-                    (str(k), with_loss(trial.settings, fault, units))
-                    for k, units in enumerate(losses[label])
-                )
-            trials.append(replace(trial, evaluations=evaluations[label]))
-    return trials

@@ -5,7 +5,7 @@ An `Observer` receives the progress.
 
 import json
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from math import inf
@@ -24,104 +24,14 @@ from ..store.store import Store
 from ..trials.arrangement import check_conditions
 from ..trials.checkpoints import remove_damaged
 from ..trials.keeping import open_to_run, pending
-from ..trials.trial import Trial, trials_of
-from ..workers.runner import Backend, Observer, Outcome, run_trials, versions
+from ..trials.trial import trials_of
+from ..workers.runner import Backend, Observer, Outcome, RunTrial, run_trials, versions
 from ..workers.workers import check_workers, start_workers
 from .data import Place
 from .study import StudyResults
 
 CHECKPOINT = 300.0
 """Default interval between checkpoints of a trial [s]."""
-
-
-@contextmanager
-def run_study(
-    spec: Spec,
-    directory: Path,
-    *,
-    jobs: int | None = None,
-    backend: Backend = "loky",
-    address: str | None = None,
-    retry_failed: bool = False,
-    accept_code: bool = False,
-    observer: Observer | None = None,
-    chosen: Sequence[Trial] = (),
-    checkpoint: float = CHECKPOINT,
-) -> Iterator[Store]:
-    """Run the missing trials of a study; then its store is open until the context ends.
-
-    Parameters
-    ----------
-    spec
-        The study.
-    directory
-        Folder of the study; created if it does not exist.
-    jobs, backend, address
-        Kind and number of workers, see `start_workers`.
-    retry_failed
-        Whether failed trials are run again.
-    accept_code
-        Whether to continue a study although the installed code has changed.
-    observer
-        Object that is notified of progress; None for no notifications.
-    chosen
-        Trials to run. By default, all.
-    checkpoint
-        Interval between checkpoints of a trial, from which a killed trial resumes [s]; 0 for no
-        checkpoints.
-
-    Yields
-    ------
-    Store
-        Contains the results of every trial, or its traceback (`Store.failed`).
-
-    Raises
-    ------
-    SpecError
-        If the study cannot be run or continued; one line says why.
-    KeyboardInterrupt
-        If it is interrupted. Finished trials are kept, and the same call continues.
-    """
-    observer = observer or Observer()
-    measures = examine(spec, may_fail=True)
-    trials = chosen or trials_of(spec)
-    check_workers(backend, jobs, address)
-    if not 0.0 <= checkpoint < inf:
-        raise SpecError(f"--checkpoint {checkpoint:g}: must be 0 or more seconds")
-    with ExitStack() as stack:
-        start = partial(start_workers, backend, jobs, address)
-        # A cluster that cannot be reached is reported before anything is written.
-        workers = None if address is None else stack.enter_context(start(len(trials)))
-        opened = open_to_run(directory, spec, trials, measures, accept_code=accept_code)
-        store = stack.enter_context(opened)
-        if retry_failed:
-            store.forget_failed()
-        if checkpoint:
-            kept = _checkpoints(store, checkpoint, observer)
-            spec.sources.checkpoints = stack.enter_context(kept)
-        left = pending(store, trials)
-        # A user's study is made again in every worker, which knows its file.
-        with spec.sources.active():
-            is_own = is_reference(spec.study)
-            run_one = measure_by_name if is_own else load_study(spec.study).measure
-        for note in (*store.notes, *spec.warnings()):
-            observer.note(note)
-        outcomes: Iterator[Outcome] = iter(())
-        if left:
-            workers = workers or stack.enter_context(start(len(left)))
-            observer.announce(spec, directory, workers.processes)
-            if not workers.processes:
-                observer.note("there is no worker yet: waiting for one")
-            outcomes = stack.enter_context(closing(run_trials(left, store, run_one, workers)))
-        try:
-            observer.follow(outcomes, len(trials), len(trials) - len(left))
-        except KeyboardInterrupt:
-            observer.note(
-                f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "
-                f"{directory}; the same command continues"
-            )
-            raise
-        yield store
 
 
 @contextmanager
@@ -134,7 +44,7 @@ def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[C
             observer.note(remark)
     code = json.dumps([store.code_digest, versions()])
     try:
-        yield Checkpoints(folder, seconds, code)
+        yield folder, seconds, code
     finally:
         with suppress(OSError):
             folder.rmdir()
@@ -167,6 +77,7 @@ def run(
     progress: bool = True,
     observer: Observer | None = None,
     checkpoint: float = CHECKPOINT,
+    chosen: Collection[str] = (),
 ) -> StudyResults:
     """Run the missing trials of a study and return all results; the same call resumes the study.
 
@@ -177,12 +88,21 @@ def run(
     out
         Folder of the study; created if it does not exist. Every trial is stored as soon as it
         finishes.
-    jobs, backend, address, retry_failed, accept_code, checkpoint
-        As in `run_study`.
+    jobs, backend, address
+        Kind and number of workers, see `start_workers`.
+    retry_failed
+        Whether failed trials are run again.
+    accept_code
+        Whether to continue a study although the installed code has changed.
     progress
         Whether to show progress in the terminal.
     observer
         Receives the progress instead, see `nested_agents.studies.workers.runner.Observer`.
+    checkpoint
+        Interval between checkpoints of a trial, from which a killed trial resumes [s]; 0 for no
+        checkpoints.
+    chosen
+        Identities of the trials to run. By default, all.
 
     Warns
     -----
@@ -193,25 +113,57 @@ def run(
     ------
     SpecError
         If the study cannot be run or continued; one line says why.
+    KeyboardInterrupt
+        If it is interrupted. Finished trials are kept, and the same call continues.
     """
     expect("the path of a folder", str | PathLike, out=out)
-    out = Path(out)
-    spec = Spec.read(spec, study=out)
+    directory = Path(out)
+    spec = Spec.read(spec, study=directory)
     listener = observer or (Terminal() if progress else Observer())
-    with run_study(
-        spec,
-        out,
-        jobs=jobs,
-        backend=backend,
-        address=address,
-        retry_failed=retry_failed,
-        accept_code=accept_code,
-        observer=listener,
-        checkpoint=checkpoint,
-    ) as store:
+    measures = examine(spec, may_fail=True)
+    trials = [t for t in trials_of(spec) if not chosen or t.identity in chosen]
+    check_workers(backend, jobs, address)
+    if not 0.0 <= checkpoint < inf:
+        raise SpecError(f"--checkpoint {checkpoint:g}: must be 0 or more seconds")
+    with ExitStack() as stack:
+        start = partial(start_workers, backend, jobs, address)
+        # A cluster that cannot be reached is reported before anything is written.
+        workers = None if address is None else stack.enter_context(start(len(trials)))
+        opened = open_to_run(directory, spec, trials, measures, accept_code=accept_code)
+        store = stack.enter_context(opened)
+        if retry_failed:
+            store.forget_failed()
+        if checkpoint:
+            kept = _checkpoints(store, checkpoint, listener)
+            spec.sources.checkpoints = stack.enter_context(kept)
+        left = pending(store, trials)
+        for note in (*store.notes, *spec.warnings()):
+            listener.note(note)
+        outcomes: Iterator[Outcome] = iter(())
+        if left:
+            workers = workers or stack.enter_context(start(len(left)))
+            listener.announce(spec, directory, workers.processes)
+            if not workers.processes:
+                listener.note("there is no worker yet: waiting for one")
+            arriving = run_trials(left, store, _measure_of(spec), workers)
+            outcomes = stack.enter_context(closing(arriving))
+        try:
+            listener.follow(outcomes, len(trials), len(trials) - len(left))
+        except KeyboardInterrupt:
+            listener.note(
+                f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "
+                f"{directory}; the same command continues"
+            )
+            raise
         study = StudyResults.of(store)
     if study.failed and observer is None:
         warnings.warn(
             f"{count(len(study.failed), 'trial')} failed: study.failed says why", stacklevel=2
         )
     return study
+
+
+def _measure_of(spec: Spec) -> RunTrial:
+    """Return the function that runs a trial; workers make a user's study again."""
+    with spec.sources.active():
+        return measure_by_name if is_reference(spec.study) else load_study(spec.study).measure

@@ -14,10 +14,12 @@ from ..store.writer import read_running
 from ..workers.runner import cores
 
 
-@dataclass(frozen=True)
-class Progress:
-    """The trials of a study, each counted once."""
+@dataclass(frozen=True, repr=False)
+class Status:
+    """Progress of a study; printed like the command ``status``. Each trial is counted once."""
 
+    outline: StudyOutline
+    """Outline of the study."""
     total: int
     """Number of trials."""
     done: int
@@ -33,13 +35,46 @@ class Progress:
     machine, or 0 if no trial can run."""
     seconds: float | None
     """Estimate of the remaining time [s]; None if no trial has finished."""
-    damaged: tuple[str, ...]
-    """One line for each finished trial with damaged results. Such a trial has to run again."""
-    refusal: str | None
-    """One line on why the installed code does not continue the study; None if it does."""
+    remarks: tuple[str, ...]
+    """A line for each problem: another spec in the folder, code that does not continue the study,
+    and every finished trial with damaged results, which has to run again."""
+
+    @classmethod
+    def of(cls, directory: Path) -> Status:
+        """Return the progress of the study in a directory; this does not disturb a run.
+
+        Raises
+        ------
+        SpecError
+            If the directory holds no readable study.
+        """
+        with Store.open(directory) as store:
+            return progress(store)
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    __repr__ = __str__
+
+    def lines(self) -> Iterator[str]:
+        """Yield lines on the trials that are done, running, failed and left, and the remarks."""
+        conditions = count(len(self.outline.columns), "condition")
+        seeds = count(len(self.outline.seeds), "seed")
+        yield f"study    {self.outline.study}: {conditions} x {seeds}"
+        yield f"done     {self.done} of {self.total} trials"
+        yield f"running  {len(self.running)}"
+        for condition, seed, seconds in self.running:
+            yield f"         {condition}, seed {seed}, for {duration(seconds)}"
+        yield f"failed   {self.failed}"
+        yield f"left     {self.left}"
+        if self.seconds:
+            using = "with" if self.running else "if continued with"
+            processes = count(self.processes, "process", "es")
+            yield f"time     about {duration(self.seconds)} {using} {processes}"
+        yield from self.remarks
 
 
-def progress(store: Store) -> Progress:
+def progress(store: Store) -> Status:
     """Return the progress of the study of an open store."""
     trials = store.planned()
     refusal = outdated(store)
@@ -57,7 +92,11 @@ def progress(store: Store) -> Progress:
     usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
     spent = [(condition, seconds) for condition, _, seconds in running]
-    return Progress(
+    other = None if store.is_older else other_spec(store)
+    remarks = [f"spec     {other}"] * bool(other)
+    remarks += [f"\nnothing can be added: {refusal}"] * bool(refusal)
+    return Status(
+        outline=StudyOutline.kept(store),
         total=len(trials),
         done=len(trials) - len(pending) - failed,
         failed=failed,
@@ -65,8 +104,7 @@ def progress(store: Store) -> Progress:
         running=tuple(running),
         processes=processes,
         seconds=_estimate(store.mean_seconds(), left, spent, processes),
-        damaged=tuple(store.notes),
-        refusal=refusal,
+        remarks=(*remarks, *(f"\n{line}" for line in store.notes)),
     )
 
 
@@ -85,65 +123,6 @@ def _estimate(
     rest = [max(means.get(condition, overall) - spent, 0.0) for condition, spent in running]
     waiting = sum(means.get(condition, overall) for condition in left)
     return max((waiting + sum(rest)) / processes, max(rest, default=0.0))
-
-
-def describe(store: Store, now: Progress) -> Iterator[str]:
-    """Yield lines on the trials that are done, running, failed and left, and on damage.
-
-    Parameters
-    ----------
-    store
-        The open store.
-    now
-        Progress of its study.
-    """
-    outline = StudyOutline.kept(store)
-    extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
-    yield f"study    {outline.study}: {extent}"
-    yield f"done     {now.done} of {now.total} trials"
-    yield f"running  {len(now.running)}"
-    for condition, seed, seconds in now.running:
-        yield f"         {condition}, seed {seed}, for {duration(seconds)}"
-    yield f"failed   {now.failed}"
-    yield f"left     {now.left}"
-    if now.seconds:
-        using = "with" if now.running else "if continued with"
-        processes = count(now.processes, "process", "es")
-        yield f"time     about {duration(now.seconds)} {using} {processes}"
-    if not store.is_older and (remark := other_spec(store)) is not None:
-        yield f"spec     {remark}"
-    if now.refusal:
-        yield f"\nnothing can be added: {now.refusal}"
-    for line in now.damaged:
-        yield f"\n{line}"
-
-
-@dataclass(frozen=True)
-class Status:
-    """Progress of a study; printed like the command ``status``."""
-
-    progress: Progress
-    """Numbers of trials by state."""
-    text: str
-    """The progress as text."""
-
-    @classmethod
-    def of(cls, directory: Path) -> Status:
-        """Return the progress of the study in a directory; this does not disturb a run.
-
-        Raises
-        ------
-        SpecError
-            If the directory holds no readable study.
-        """
-        with Store.open(directory) as store:
-            now = progress(store)
-            return cls(now, "\n".join(describe(store, now)))
-
-    def __repr__(self) -> str:
-        return self.text
-
-    __str__ = __repr__
 
 
 def failures(failed: Iterable[tuple[str, int, str]]) -> Iterator[str]:

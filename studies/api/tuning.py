@@ -14,6 +14,7 @@ from functools import reduce
 from itertools import starmap
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,15 +22,13 @@ from ...core.numerics import pd
 from ...core.plugins.words import expect, show
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
-from ..results.results import read
 from ..spec.spec import Spec
 from ..spec.tables import TomlTable, dumps, nested, override
 from ..store import durable
 from ..trials.arrangement import check_conditions
 from ..trials.trial import trials_of
-from ..workers.runner import Backend, Observer
-from .loading import load
-from .running import run_study
+from ..workers.runner import Observer
+from .running import run
 from .study import StudyResults
 
 FIRST_SEED = 10_000
@@ -105,11 +104,8 @@ def tune(
     seeds: int = 16,
     first_seed: int = FIRST_SEED,
     draw: int = 0,
-    jobs: int | None = None,
-    backend: Backend = "loky",
-    address: str | None = None,
-    accept_code: bool = False,
     progress: bool = True,
+    **running: Any,
 ) -> Tuning:
     """Search for a better configuration of a spec; the same call resumes an interrupted search.
 
@@ -129,10 +125,10 @@ def tune(
         First seed, 10,000 or more.
     draw
         Seed of the random search.
-    jobs, backend, address, accept_code
-        As in `nested_agents.run`.
     progress
         Whether to show progress.
+    **running
+        ``jobs``, ``backend``, ``address`` and ``accept_code`` as in `nested_agents.run`.
 
     Raises
     ------
@@ -147,22 +143,14 @@ def tune(
     study = _study(spec, configurations, range(first_seed, first_seed + seeds))
     observer = Terminal() if progress else Observer()
     names = list(configurations)
+    every_trial = trials_of(study)
     for n_configurations, n_seeds in rungs(len(configurations), seeds):
         names = names[:n_configurations]
         wanted = {*names, GIVEN, *(CONTROLS if n_seeds == seeds else ())}
         last_seed = first_seed + n_seeds - 1
-        chosen = [t for t in trials_of(study) if t.condition in wanted and t.seed <= last_seed]
-        with run_study(
-            study,
-            out,
-            jobs=jobs,
-            backend=backend,
-            address=address,
-            accept_code=accept_code,
-            observer=observer,
-            chosen=chosen,
-        ) as store:
-            episodes = read(store).episodes
+        chosen = {t.identity for t in every_trial if t.condition in wanted and t.seed <= last_seed}
+        results = run(study, out, observer=observer, chosen=chosen, **running)
+        episodes = results.episodes
         table = _ranking(episodes[episodes["seed"] <= last_seed], configurations)
         observer.note(f"compared {count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
         names = [name for name in table["name"] if name in names]
@@ -170,7 +158,7 @@ def tune(
     tuned = _with_configuration(spec, best)
     durable.write(out / BEST_FILE, dumps(tuned.table()).encode())
     durable.write(out / TABLE_FILE, table.to_csv(index=False).encode())
-    finalists = load(out).where(f"condition in {[GIVEN, *names, *CONTROLS]}")
+    finalists = results.where(f"condition in {[GIVEN, *names, *CONTROLS]}")
     return Tuning(tuned, best, finalists, table)
 
 

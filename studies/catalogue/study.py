@@ -7,7 +7,7 @@ A spec names a study of the catalog, ``study = "scaling"``, or a class in a file
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import SpecError, refused
@@ -24,12 +24,8 @@ T = TypeVar("T")
 
 PARTS = ("measure", "analyse", "draw")
 """Attributes that every study needs."""
-OPTIONS = {"check": "check", "NUMBERS": "numbers", "PUBLISHED": "published", "TIMED": "timed"}
-"""Optional attributes, and the field of `LoadedStudy` for each."""
-
-
-def accept(spec: Spec) -> None:
-    """Accept any spec."""
+OPTIONS = ("check", "NUMBERS", "PUBLISHED", "TIMED")
+"""Optional attributes; `Study` has their defaults."""
 
 
 class Study:
@@ -53,6 +49,9 @@ class Study:
     """Measures in published results; None for all."""
     TIMED: bool = True
     """Whether trials are long enough for meaningful times."""
+    analyse: Callable[[Results], Any]
+    """Returns the estimates of results with the attribute `table` of `Summary` rows, and optional
+    attributes of `nested_agents.studies.results.analysis.Analysis`."""
 
     def check(self, spec: Spec) -> None:
         """Raise `SpecError` if the spec does not fit the study."""
@@ -66,28 +65,7 @@ class Study:
         return {}
 
 
-@dataclass(frozen=True)
-class LoadedStudy:
-    """Attributes of a study with defaults for missing ones."""
-
-    measure: Callable[[Trial], TrialResult]
-    """Runs one trial; imported by name in worker processes."""
-    analyse: Callable[[Results], Any]
-    """Returns the estimates of results with the attribute `table` of `Summary` rows, and optional
-    attributes of `nested_agents.studies.results.analysis.Analysis`."""
-    draw: Callable[[Any], Figures]
-    """Returns the figures of an analysis by name."""
-    check: Callable[[Spec], None] = accept
-    """Raises `SpecError` if the spec does not fit the study."""
-    numbers: Sequence[str] = ()
-    """Names of the numbers of whole trials that the analysis needs."""
-    published: Sequence[str] | None = None
-    """Names of the measures in published results; None for all."""
-    timed: bool = True
-    """Whether trials are long enough for meaningful times."""
-
-
-def load_study(name: str) -> LoadedStudy:
+def load_study(name: str) -> Study:
     """Return a study by its name in `STUDIES` or in a user's file.
 
     Raises
@@ -101,9 +79,10 @@ def load_study(name: str) -> LoadedStudy:
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     source = entry() if isinstance(entry, type) else entry
-    names = OPTIONS | {part: part for part in PARTS}
-    known = {own: getattr(source, part) for part, own in names.items() if hasattr(source, part)}
-    return LoadedStudy(**known)
+    study = Study()
+    own = {part: getattr(source, part) for part in dir(source) if part in (*PARTS, *OPTIONS)}
+    vars(study).update(own)
+    return study
 
 
 def notes_of(analysis: Any) -> tuple[str, ...]:
@@ -168,7 +147,7 @@ def analyse_as(name: str, results: Results) -> Any:
         If the study is unknown, or trials lack numbers that it needs.
     """
     study = load_study(name)
-    for needed in study.numbers:
+    for needed in study.NUMBERS:
         for condition in results.conditions:
             if needed not in results.numbers(condition):
                 raise SpecError(
@@ -186,9 +165,10 @@ def select_published(name: str, results: Results) -> Results:
     """Return the part of results that a study publishes, see `Study.PUBLISHED` and `TIMED`."""
     study = load_study(name)
     measures = results.measures
-    if study.published is not None:
-        measures = tuple(m for m in measures if m.name in study.published)
-    trials = results.trials if study.timed else results.trials.drop(columns=list(results.usage))
+    published = study.PUBLISHED
+    if published is not None:
+        measures = tuple(m for m in measures if m.name in published)
+    trials = results.trials if study.TIMED else results.trials.drop(columns=list(results.usage))
     return replace(results, measures=measures, trials=trials)
 
 
@@ -208,7 +188,7 @@ def system_of(results: Results, condition: str) -> tuple[str, dict[str, object]]
     return name, {key: value for key, value in columns.items() if value != ""}
 
 
-def draw_figures(study: LoadedStudy, analysis: Any) -> Figures:
+def draw_figures(study: Study, analysis: Any) -> Figures:
     """Return the figures of an analysis in the common style; none for an empty table."""
     from ..presentation.figures import apply_style, spell_dollars  # matplotlib takes its time
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -20,6 +20,7 @@ from ..store.store import Store
 
 if TYPE_CHECKING:
     from ..api.study import StudyResults
+    from ..spec.spec import Spec
 
 
 @contextmanager
@@ -79,6 +80,15 @@ def trust_beside(*places: Path) -> None:
         if (folder / DATABASE).exists():
             _trust(untrusted(folder))
             _trust(_named_by_copy(folder))
+
+
+def load_spec(path: Path, changes: Iterable[str], *, trust: bool, out: Path | None = None) -> Spec:
+    """Return a changed spec; `trust` allows the code of the study beside it or in a folder."""
+    from ..spec.spec import Spec
+
+    if trust:
+        trust_beside(*filter(None, (out, path)))
+    return Spec.load(path, changes, study=out)
 
 
 def _trust(texts: Mapping[str, str]) -> None:

@@ -7,13 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
 
 import click
 from click.core import ParameterSource
-
-if TYPE_CHECKING:
-    from ..workers.runner import Backend
 
 PATH = click.Path(path_type=Path)
 """A path, which need not exist."""
@@ -139,17 +135,8 @@ _accept_code = flag(
 )
 
 
-class RunOptions(TypedDict):
-    """The options of who runs trials, as `nested_agents.studies.api.running.run` takes them."""
-
-    jobs: int | None
-    backend: Backend
-    address: str | None
-    accept_code: bool
-
-
 def running(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options of who runs trials, see `RunOptions`."""
+    """Add the options of who runs trials, as `nested_agents.studies.api.running.run` takes them."""
     return jobs(_backend(_address(_accept_code(command))))
 
 
@@ -221,6 +208,13 @@ phase = click.option(
 )
 """Phase of the episodes of a study."""
 
+
+size = click.option(
+    "--size",
+    metavar="KEY",
+    help="The swept key that is the size; by default the number of robots or agents.",
+)
+"""Key of the team size."""
 
 columns = click.option(
     "--columns",

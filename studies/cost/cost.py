@@ -14,10 +14,9 @@ membership functions, because all of their rules fire.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass, field
 from fractions import Fraction
 from statistics import median
-from typing import NamedTuple
 
 from ...core.agents.cost import Problem, below_counts
 from ...core.agents.joint import join_agents
@@ -78,37 +77,8 @@ MAX_STEPS = 100
 """Maximum number of steps of a measurement."""
 
 
-class StepCost(NamedTuple):
-    """Cost of one step of the running system."""
-
-    counted: Counts
-    """Counts of the whole team per step."""
-    deciding: float
-    """Median time of a decision [s]."""
-    learning: float
-    """Median time of learning from a step [s]."""
-
-
-class BudgetCost(NamedTuple):
-    """Cost if a team may try a limited number of joint actions in a decision."""
-
-    budget: int
-    joint_actions: int
-    """Joint actions that all agents try without the limit."""
-    tried: int
-    """Joint actions that they try within it."""
-    operations: int
-    """Operations by Eq. 18, or by Eq. 23 for the single agent, with the joint actions tried."""
-
-
-class NetworkCost(NamedTuple):
-    """Messages of one decision."""
-
-    messages: int
-    in_turn: int
-    """Number of messages that must be sent one after another."""
-    broadcast: int
-    """Number of states that agents send to all others in addition, for predictions."""
+Columns = dict[str, float]
+"""Values of a row by column; counts are exact integers."""
 
 
 @dataclass(frozen=True)
@@ -130,15 +100,10 @@ class CostRow:
     """Operations by Eq. 23."""
     memberships: int | None = None
     """Membership functions of each state variable, if they determine the rules."""
-    within_budget: BudgetCost | None = None
-    """Cost within the budget of a decision, if there is one."""
-    formula: Counts | None = None
-    """Counts of a step of the whole team by the formulas, if a measurement was requested."""
-    measured: StepCost | None = None
-    network: NetworkCost | None = None
-    """Messages, if requested."""
     free: int = 0
     """Maximum number of agents in one search; 0 for `DECISION_METHODS`."""
+    extra: Columns = field(default_factory=dict)
+    """Columns that were requested: of `within_budget`, `messages`, `step_formula` and `measure`."""
 
     @property
     def ratio(self) -> Fraction | None:
@@ -159,11 +124,12 @@ def joint_actions(text: str, n: int, actions: int) -> list[int]:
     return [actions ** (1 + below) for below in agents_below(topology, n)]
 
 
-def within_budget(row: CostRow, needs: Sequence[int], budget: int) -> BudgetCost:
+def within_budget(row: CostRow, needs: Sequence[int], budget: int) -> Columns:
     """Return the cost of a row if its team may try `budget` joint actions in a decision.
 
     The budget is divided over the agents as in a running team. `needs` are the joint actions that
-    each agent tries without it.
+    each agent tries without it. Operations are by Eq. 18, or by Eq. 23 for the single agent, with
+    the joint actions tried.
 
     Raises
     ------
@@ -179,26 +145,36 @@ def within_budget(row: CostRow, needs: Sequence[int], budget: int) -> BudgetCost
     operations = row.problem.sweep(tried)
     if row.nested_exact is None:  # the single agent has the rules of all agents together
         operations *= row.problem.rules ** (row.agents - 1)
-    return BudgetCost(budget, sum(needs), sum(tried), operations)
+    return {
+        "budget": budget,
+        "joint_actions": sum(needs),
+        "joint_actions_tried": sum(tried),
+        "operations": operations,
+    }
 
 
-def messages(text: str, n: int) -> NetworkCost:
+def messages(text: str, n: int) -> Columns:
     """Return the number of messages of a decision.
 
     A single agent collects the states of all others and sends their actions. In a chain each agent
     receives the actions of all above. Variable elimination passes a table from agent to agent and
-    the best actions back. In max-plus, neighbors exchange messages in each round.
+    the best actions back. In max-plus, neighbors exchange messages in each round. Broadcast are
+    the states that agents send to all others in addition, for predictions.
     """
-    if text == SINGLE_AGENT:
-        return NetworkCost(2 * (n - 1), 2 * (n > 1), 0)
-    hierarchy = _hierarchy(DECISION_METHODS.get(text, (text,))[0], n)
+    sent = in_turn = 2 * n - 2
     broadcast = n * (n - 1)
-    if not hierarchy.neighbors:
-        return NetworkCost(hierarchy.n_messages, hierarchy.depth - 1, broadcast)
-    if text == "max-plus":
-        rounds = MaxPlusSettings().rounds
-        return NetworkCost(rounds * hierarchy.n_messages, rounds, broadcast)
-    return NetworkCost(2 * n - 2, 2 * n - 2, broadcast)
+    if text == SINGLE_AGENT:
+        in_turn = 2 * (n > 1)
+        broadcast = 0
+    else:
+        hierarchy = _hierarchy(DECISION_METHODS.get(text, (text,))[0], n)
+        if not hierarchy.neighbors:
+            sent = hierarchy.n_messages
+            in_turn = hierarchy.depth - 1
+        elif text == "max-plus":
+            in_turn = MaxPlusSettings().rounds
+            sent = in_turn * hierarchy.n_messages
+    return {"messages": sent, "messages_in_turn": in_turn, "broadcast": broadcast}
 
 
 def _hierarchy(text: str, n: int) -> Hierarchy:
@@ -237,10 +213,16 @@ def step_formula(text: str, n: int) -> Counts:
     return Counts(joint, joint * RULES, n * RULES)
 
 
-def measure(text: str, n: int) -> StepCost | None:
-    """Count and time a step of n agents; None if it would take too long."""
-    if text in MODEL_FREE or step_formula(text, n).rule_evaluations > MAX_OPERATIONS:
-        return None
+def measure(text: str, n: int) -> Columns:
+    """Return the counts of a step of n agents by formula, counted and timed.
+
+    A step that would take too long is not counted and timed.
+    """
+    formula = step_formula(text, n)
+    columns: Columns = {"measured_rules": RULES, "measured_actions": ACTIONS}
+    columns |= {f"{name}_formula_per_step": count for name, count in asdict(formula).items()}
+    if text in MODEL_FREE or formula.rule_evaluations > MAX_OPERATIONS:
+        return columns
     learner, scenario, hierarchy = _arrange(text, LineUpSettings(carts=n).build())
     team = Team(learner, scenario, hierarchy, policy_seed(0))
     _step(team, scenario)  # compiles everything
@@ -250,12 +232,10 @@ def measure(text: str, n: int) -> StepCost | None:
         times.append(_step(team, scenario))
     # An episode has two steps, and only the second one updates weights.
     steps = 2 * len(times), 2 * len(times), len(times)
-    counted = (
-        int(after - first) // count
-        for first, after, count in zip(before, astuple(team.counts), steps, strict=True)
-    )
+    counts = zip(asdict(formula), before, astuple(team.counts), steps, strict=True)
+    counted = {f"{name}_per_step": int(after - b) // count for name, b, after, count in counts}
     deciding, learning = map(median, zip(*times, strict=True))
-    return StepCost(Counts(*counted), deciding, learning)
+    return columns | counted | {"decision_ms": 1e3 * deciding, "learning_ms": 1e3 * learning}
 
 
 def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hierarchy]:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from textwrap import wrap
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from ...core.numerics import pd
 from ...core.search.enumeration import AutoSettings
@@ -23,31 +23,24 @@ VARIABLES = 7
 """Number of state variables of an agent (Section III): rules = memberships ** VARIABLES."""
 QUANTITIES = ("memberships", "rules", "actions")
 """Quantities that a table may vary."""
+COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
+"""Counts of a step, by formula and counted."""
 OF_THE_PAPER = PAPER.chain_closed_form(4)
 """Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
 
 
-class Section(NamedTuple):
-    """A part of the table that is printed on its own."""
+Headings = Mapping[str, str]
+"""Headings by column of the data frame."""
 
-    title: str
-    headings: Mapping[str, str]
-    """Headings by column of the data frame."""
-    legend: tuple[str, ...] = ()
-
-
-FORMULAS = Section(
-    "",
-    {
-        "nested_exact": "Eq. 18",
-        "nested_closed_form": "Eq. 19",
-        "nested_asymptotic": "Eq. 21",
-        "single_agent": "Eq. 23",
-        "ratio": "ratio",
-    },
-)
-SECTIONS = (
-    Section(
+FORMULAS: Headings = {
+    "nested_exact": "Eq. 18",
+    "nested_closed_form": "Eq. 19",
+    "nested_asymptotic": "Eq. 21",
+    "single_agent": "Eq. 23",
+    "ratio": "ratio",
+}
+SECTIONS: tuple[tuple[str, Headings, tuple[str, ...]], ...] = (
+    (
         "Within a budget of joint actions that the team may try in a decision:",
         {
             "budget": "budget",
@@ -60,7 +53,7 @@ SECTIONS = (
             "operations: by Eq. 18 or 23 with the joint actions tried.",
         ),
     ),
-    Section(
+    (
         f"Per step of the running system (line-up scenario, |A| = {ACTIONS}, |S| = {RULES}):",
         {
             "joint_actions_formula_per_step": "formula",
@@ -75,7 +68,7 @@ SECTIONS = (
             "-: not measured, because a step takes more than about a second.",
         ),
     ),
-    Section(
+    (
         "Messages of a decision:",
         {"messages": "messages", "messages_in_turn": "in turn", "broadcast": "broadcast"},
         (
@@ -84,7 +77,7 @@ SECTIONS = (
         ),
     ),
 )
-"""Sections of budgets, measurements and messages, which a table may have."""
+"""Title, headings and legend of budgets, measurements and messages, which a table may have."""
 
 
 def format_rows(rows: Sequence[CostRow], form: Form) -> str:
@@ -94,8 +87,8 @@ def format_rows(rows: Sequence[CostRow], form: Form) -> str:
     if form == "table":
         return _table(rows, frame)
     if form == "latex":
-        sections = [FORMULAS, *(s for s in SECTIONS if next(iter(s.headings)) in frame)]
-        return "\n\n".join(_tabular(section, frame, rows) for section in sections)
+        sections = [FORMULAS, *(own for _, own, _ in SECTIONS if next(iter(own)) in frame)]
+        return "\n\n".join(_tabular(headings, frame, rows) for headings in sections)
     most = sys.get_int_max_str_digits()
     sys.set_int_max_str_digits(0)  # those of n = 1000 are more than Python prints
     try:
@@ -110,7 +103,7 @@ def _record(row: CostRow) -> dict[str, object]:
     """Return a row as a record of exact integers; Eq. 21 is rounded."""
     asymptotic = row.nested_asymptotic
     ratio = row.ratio
-    record: dict[str, object] = {
+    return {
         "agents": row.agents,
         "topology": row.topology,
         "memberships": row.memberships,
@@ -120,24 +113,8 @@ def _record(row: CostRow) -> dict[str, object]:
         "nested_asymptotic": None if asymptotic is None else round(asymptotic),
         "single_agent": row.single_agent,
         "ratio": ratio and (float(ratio) if ratio < 2**53 else round(ratio)),
+        **row.extra,
     }
-    if row.within_budget is not None:
-        own = row.within_budget
-        record |= {"budget": own.budget, "joint_actions": own.joint_actions}
-        record |= {"joint_actions_tried": own.tried, "operations": own.operations}
-    if row.network is not None:
-        sent = row.network
-        record |= {"messages": sent.messages, "messages_in_turn": sent.in_turn}
-        record["broadcast"] = sent.broadcast
-    if row.formula is not None:
-        record |= {"measured_rules": RULES, "measured_actions": ACTIONS}
-        record |= {f"{name}_formula_per_step": n for name, n in asdict(row.formula).items()}
-    if row.measured is not None:
-        counted = asdict(row.measured.counted)
-        record |= {f"{name}_per_step": n for name, n in counted.items()}
-        record["decision_ms"] = 1e3 * row.measured.deciding
-        record["learning_ms"] = 1e3 * row.measured.learning
-    return record
 
 
 def _varied(frame: pd.DataFrame) -> list[str]:
@@ -145,12 +122,12 @@ def _varied(frame: pd.DataFrame) -> list[str]:
     return [name for name in QUANTITIES if frame[name].nunique(dropna=False) > 1]
 
 
-def _cells(section: Section, frame: pd.DataFrame) -> list[list[str]]:
+def _cells(headings: Headings, frame: pd.DataFrame) -> list[list[str]]:
     """Return the cells of a section, headings first; equal rows stand once."""
-    varied = _varied(frame) if {"nested_exact", "budget"} & {*section.headings} else []
+    varied = _varied(frame) if {"nested_exact", "budget"} & {*headings} else []
     varied = [name for name in varied if name != "memberships"]  # the rules say the same
-    columns = [*varied, "agents", "topology", *section.headings]
-    names = [*varied, "n", "topology", *section.headings.values()]
+    columns = [*varied, "agents", "topology", *headings]
+    names = [*varied, "n", "topology", *headings.values()]
     part = frame.reindex(columns=columns).drop_duplicates()
     return [names, *([*map(_shown, row)] for row in rows_of(part))]
 
@@ -172,18 +149,22 @@ def _table(rows: Sequence[CostRow], frame: pd.DataFrame) -> str:
     lines = [*_aligned(FORMULAS, frame), ""]
     for text in _legend(rows, frame):
         lines += wrap(text, WIDTH, break_on_hyphens=False)
-    for section in SECTIONS:
-        if next(iter(section.headings)) in frame:
-            lines += ["", section.title, "", *_aligned(section, frame), "", *section.legend]
-    same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
+    for title, headings, legend in SECTIONS:
+        if next(iter(headings)) in frame:
+            lines += ["", title, "", *_aligned(headings, frame), "", *legend]
+    counted = [row.extra for row in rows if "decision_ms" in row.extra]
+    same = [
+        all(own[f"{name}_per_step"] == own[f"{name}_formula_per_step"] for name in COUNTS)
+        for own in counted
+    ]
     lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     return "\n".join(lines)
 
 
-def _aligned(section: Section, frame: pd.DataFrame) -> list[str]:
-    cells = _cells(section, frame)
+def _aligned(headings: Headings, frame: pd.DataFrame) -> list[str]:
+    cells = _cells(headings, frame)
     place = cells[0].index("topology")
-    return align(cells, f"{'>' * place}<{'>' * len(section.headings)}", 1 + place)
+    return align(cells, f"{'>' * place}<{'>' * len(headings)}", 1 + place)
 
 
 def _constants(rows: Sequence[CostRow], frame: pd.DataFrame) -> str:
@@ -223,15 +204,15 @@ def _legend(rows: Sequence[CostRow], frame: pd.DataFrame) -> Iterator[str]:
         )
 
 
-def _tabular(section: Section, frame: pd.DataFrame, rows: Sequence[CostRow]) -> str:
-    head, *lines = _cells(section, frame)
+def _tabular(headings: Headings, frame: pd.DataFrame, rows: Sequence[CostRow]) -> str:
+    head, *lines = _cells(headings, frame)
     table = pd.DataFrame(lines, columns=head)
     for name in head:
         if name != "topology":
             table[name] = table[name].map(_latex_cell)
     place = head.index("topology")
-    columns = f"{'r' * place}l{'r' * len(section.headings)}"
-    note = f"; {_constants(rows, frame)}" if section is FORMULAS else ""
+    columns = f"{'r' * place}l{'r' * len(headings)}"
+    note = f"; {_constants(rows, frame)}" if headings is FORMULAS else ""
     return in_latex(table, "topology", columns, note).rstrip()
 
 

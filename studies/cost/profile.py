@@ -15,14 +15,13 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from html import escape
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from textwrap import wrap
 from time import process_time
-from types import CodeType, FrameType, TracebackType
-from typing import NamedTuple, Self
+from types import CodeType, FrameType
 
 from ...core.agents.fuzzy import FuzzyAgents
 from ...core.agents.loop import control_loop
@@ -34,7 +33,6 @@ from ...topologies.view import align, format_count
 from ..errors import WIDTH, SpecError
 from ..results.notation import format_number
 from ..spec.spec import Spec
-from ..spec.tables import label_but
 from ..trials.arrangement import Arrangement, arrange, check_conditions
 
 PACKAGE = Path(__file__).parents[2]
@@ -67,54 +65,7 @@ ROOMS = {
 """Part of a decision that the code of each folder belongs to; other code counts for its caller."""
 
 
-class Profile(NamedTuple):
-    """Profile of one condition."""
-
-    condition: str
-    group: str
-    """Label of the condition without its size."""
-    agents: int
-    evaluator: str
-    """Search method; for teams without search, the kind of learner."""
-    decisions: int
-    """Number of timed decisions."""
-    tried: float
-    """Joint actions tried per decision."""
-    formula: int
-    """Joint actions by the formula."""
-    seconds: Mapping[str, float]
-    """Time per decision by part [s]."""
-    budget: int | None = None
-    """Maximum number of joint actions per decision; None: no limit."""
-
-    @property
-    def deciding(self) -> float:
-        """Time of a decision [s]."""
-        return sum(self.seconds[part] for part in DECIDING)
-
-
-@dataclass(frozen=True)
-class ProfileTable:
-    """Profiles of conditions; printed or shown by a notebook."""
-
-    rows: tuple[Profile, ...]
-
-    @property
-    def frame(self) -> pd.DataFrame:
-        """A row for each condition; times of parts [s]."""
-        rows = [{**row._asdict(), **row.seconds} for row in self.rows]
-        return pd.DataFrame(rows).drop(columns=["seconds", "group"])
-
-    def __str__(self) -> str:
-        return "\n".join(_lines(self.rows))
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
-
-
-def profile(spec: Spec | Mapping[str, object] | Path | str, seconds: float = 1.0) -> ProfileTable:
+def profile(spec: Spec | Mapping[str, object] | Path | str, seconds: float = 1.0) -> pd.DataFrame:
     """Profile the decisions of every condition of a study; nothing is kept.
 
     Parameters
@@ -123,6 +74,13 @@ def profile(spec: Spec | Mapping[str, object] | Path | str, seconds: float = 1.0
         A `Spec`, a table, or the path of a TOML file.
     seconds
         Time for each condition after compilation and a few steps of learning [s].
+
+    Returns
+    -------
+    DataFrame
+        A row for each condition: agents; evaluator, the search method, or the kind of learner of a
+        team without search; timed decisions; joint actions tried per decision, by formula and at
+        most; and processor time per decision of each of `PARTS` [s].
 
     Raises
     ------
@@ -139,14 +97,12 @@ def profile(spec: Spec | Mapping[str, object] | Path | str, seconds: float = 1.0
     with spec.sources.active():
         for condition in spec.conditions():
             own = arrange(condition.settings, SEED)
-            sizes = [k for k, v in condition.columns.items() if type(v) is int]
-            names = condition.label, label_but(condition.columns, sizes)
-            rows.append(_profile(names, own, spec.steps, seconds))
-    return ProfileTable(tuple(rows))
+            rows.append({"condition": condition.label, **_profile(own, spec.steps, seconds)})
+    return pd.DataFrame(rows, dtype=object)
 
 
-def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float) -> Profile:
-    """Return the profile of a condition with its label and that of its group."""
+def _profile(own: Arrangement, steps: int, wanted: float) -> dict[str, object]:
+    """Return the profile of a condition by column."""
     team = own.team
     for _ in control_loop(own.scenario, team, episodes=2, steps=min(BEGINNING, steps), seed=SEED):
         pass
@@ -155,7 +111,7 @@ def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float
     reported = 0.0
     decisions = 0
     episodes = 0
-    with Sampler() as sampler:
+    with sample_parts() as sampled:
         for record in control_loop(
             own.scenario, team, episodes=10**9, steps=steps, seed=SEED, first_episode=2
         ):
@@ -164,22 +120,21 @@ def _profile(names: tuple[str, str], own: Arrangement, steps: int, wanted: float
             seconds = record.transition.info.get("seconds", {})
             sensing += seconds.get("sensors", 0.0)
             reported += sum(seconds.values())
-            spent = sum(sampler.seconds.values())
+            spent = sum(sampled.values())
             if spent > wanted and (episodes or spent > LONGEST * wanted):
                 break
-    each = {part: sampler.seconds[part] / decisions for part in PARTS}
+    each = {part: sampled[part] / decisions for part in PARTS}
     each["sense"] = each["world"] * sensing / (reported or 1.0)
     each["world"] -= each["sense"]
-    return Profile(
-        *names,
-        agents=len(team.hierarchy),
-        evaluator=search_method(team),
-        decisions=decisions,
-        tried=(team.counts.joint_actions - before) / decisions,
-        formula=team.hierarchy.count_joint_actions(len(team.action_set)),
-        budget=budget_of(team),
-        seconds=each,
-    )
+    return {
+        "agents": len(team.hierarchy),
+        "evaluator": search_method(team),
+        "decisions": decisions,
+        "tried": (team.counts.joint_actions - before) / decisions,
+        "formula": team.hierarchy.count_joint_actions(len(team.action_set)),
+        "budget": budget_of(team),
+        **each,
+    }
 
 
 def budget_of(team: Team) -> int | None:
@@ -209,84 +164,71 @@ def search_method(team: Team) -> str:
     return " ".join(dict.fromkeys(methods))
 
 
-class Sampler:
-    """Samples processor time by part while its context is active.
+@contextmanager
+def sample_parts() -> Iterator[dict[str, float]]:
+    """Sample processor time by part while the context is active [s]."""
+    seconds = dict.fromkeys(PARTS, 0.0)
+    last = process_time()
 
-    Attributes
-    ----------
-    seconds
-        Processor time by part [s].
-    """
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(PARTS, 0.0)
-        self._parts: dict[CodeType, str] = {}
-        self._last = 0.0
-
-    def __enter__(self) -> Self:
-        self._former = signal.signal(signal.SIGALRM, self._ask)
-        self._last = process_time()
-        signal.setitimer(signal.ITIMER_REAL, INTERVAL, INTERVAL)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        at: TracebackType | None,
-    ) -> None:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, self._former)
-
-    def _ask(self, number: int, frame: FrameType | None) -> None:
+    def ask(number: int, frame: FrameType | None) -> None:
+        nonlocal last
         now = process_time()
-        part = self._part(frame)
-        if part:
-            self.seconds[part] += now - self._last
-        self._last = now
+        if part := _part(frame):
+            seconds[part] += now - last
+        last = now
 
-    def _part(self, frame: FrameType | None) -> str:
-        """Return the running part; empty outside a step of the control loop."""
-        room = ""
-        within = None
-        while frame is not None and frame.f_code is not control_loop.__code__:
-            room = room or self._room(frame.f_code)
-            within = frame.f_code
-            frame = frame.f_back
-        if frame is None:
-            return ""
-        if within is None or within is Team.act.__code__:
-            return room or "messages"
-        if within is Team.learn.__code__:
-            return "learn"
-        return "" if within.co_name == "reset" else "world"
+    former = signal.signal(signal.SIGALRM, ask)
+    signal.setitimer(signal.ITIMER_REAL, INTERVAL, INTERVAL)
+    try:
+        yield seconds
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, former)
 
-    def _room(self, code: CodeType) -> str:
-        if code not in self._parts:
-            path = Path(code.co_filename)
-            inside = path.relative_to(PACKAGE).as_posix() if path.is_relative_to(PACKAGE) else ""
-            known = (part for room, part in ROOMS.items() if inside.startswith(f"{room}/"))
-            self._parts[code] = next(known, "")
-        return self._parts[code]
+
+def _part(frame: FrameType | None) -> str:
+    """Return the running part; empty outside a step of the control loop."""
+    room = ""
+    within = None
+    while frame is not None and frame.f_code is not control_loop.__code__:
+        room = room or _room(frame.f_code)
+        within = frame.f_code
+        frame = frame.f_back
+    if frame is None:
+        return ""
+    if within is None or within is Team.act.__code__:
+        return room or "messages"
+    if within is Team.learn.__code__:
+        return "learn"
+    return "" if within.co_name == "reset" else "world"
+
+
+@cache
+def _room(code: CodeType) -> str:
+    """Return the part of a decision that code belongs to; empty if it counts for its caller."""
+    path = Path(code.co_filename)
+    inside = path.relative_to(PACKAGE).as_posix() if path.is_relative_to(PACKAGE) else ""
+    return next((part for room, part in ROOMS.items() if inside.startswith(f"{room}/")), "")
 
 
 HEADS = ("condition", "evaluator", "tried", "formula", "ms", "us each")
 
 
-def _lines(rows: Sequence[Profile]) -> Iterator[str]:
-    """Yield the tables of counts and of times by part, then sentences on growth."""
-    is_limited = any(row.budget is not None for row in rows)
+def lines(profiles: pd.DataFrame) -> Iterator[str]:
+    """Yield the tables of counts and of times by part."""
+    rows = profiles.to_dict("records")
+    is_limited = any(row["budget"] is not None for row in rows)
     counted = [[*HEADS, "budget"] if is_limited else [*HEADS]]
     timed: list[tuple[str, ...]] = [("ms", *PARTS)]
     for row in rows:
-        each = _figures(1e6 * row.deciding / row.tried) if row.tried else "-"
-        tried = format_count(round(row.tried), 10**7)
-        formula = format_count(row.formula, 10**7)
-        ms = _figures(1e3 * row.deciding)
-        counted.append([row.condition, row.evaluator, tried, formula, ms, each])
+        deciding = sum(row[part] for part in DECIDING)
+        each = _figures(1e6 * deciding / row["tried"]) if row["tried"] else "-"
+        numbers = (format_count(round(row[name]), 10**7) for name in ("tried", "formula"))
+        ms = _figures(1e3 * deciding)
+        counted.append([row["condition"], row["evaluator"], *numbers, ms, each])
         if is_limited:
-            counted[-1].append("-" if row.budget is None else f"{row.budget:,}")
-        timed.append((row.condition, *(_figures(1e3 * row.seconds[part]) for part in PARTS)))
+            counted[-1].append("-" if row["budget"] is None else f"{row['budget']:,}")
+        timed.append((row["condition"], *(_figures(1e3 * row[part]) for part in PARTS)))
     yield from align(counted, "<<>>>>>"[: len(counted[0])])
     yield ""
     yield from align(timed, f"<{'>' * len(PARTS)}")
@@ -297,41 +239,7 @@ def _lines(rows: Sequence[Profile]) -> Iterator[str]:
         "time per joint action tried.",
         WIDTH,
     )
-    yield from _growth(rows)
 
 
 def _figures(value: float) -> str:
     return "-" if value == 0.0 else format_number(value)
-
-
-def _growth(rows: Sequence[Profile]) -> Iterator[str]:
-    """Yield a sentence for each group on the growth of time from its smallest to largest team."""
-    groups: dict[str, list[Profile]] = {}
-    for row in rows:
-        groups.setdefault(row.group, []).append(row)
-    for group, own in groups.items():
-        first = min(own, key=lambda row: row.agents)
-        last = max(own, key=lambda row: row.agents)
-        if first.agents == last.agents or not first.tried:
-            continue
-        tried = last.tried / first.tried
-        longer = last.deciding / first.deciding
-        shares = {part: last.seconds[part] / last.deciding for part in DECIDING}
-        most = max(shares, key=shares.__getitem__)
-        text = (
-            f"{f'{group}: ' * bool(group)}{first.agents} to {last.agents} agents: decisions take "
-            f"{format_number(longer)} times as long: {format_number(tried)} times the joint "
-            f"actions, each {format_number(longer / tried)} times as long. The largest part is "
-            f"{most} ({shares[most]:.0%})"
-        )
-        yield from wrap(f"{text}; {_evaluators(own)}.", WIDTH, subsequent_indent="  ")
-
-
-def _evaluators(rows: Sequence[Profile]) -> str:
-    """Return the search methods, and which of them try as many joint actions as the formula."""
-    names = list(dict.fromkeys(row.evaluator for row in rows))
-    others = [row for row in rows if round(row.tried) != row.formula]
-    if not others:
-        return "as many as by the formula"
-    agents = ", ".join(str(row.agents) for row in others)
-    return f"{' then '.join(names)}: not as by the formula with {agents} agents"

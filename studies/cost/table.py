@@ -7,7 +7,7 @@ from html import escape
 from itertools import chain, product
 from math import prod
 from numbers import Integral
-from typing import TypedDict, Unpack
+from typing import Any
 
 from ...core.agents.cost import Problem, is_chain
 from ...core.plugins.words import expect, expect_each, expect_within
@@ -16,12 +16,12 @@ from .cost import (
     MEMBERSHIPS,
     PAPER,
     SINGLE_AGENT,
+    Columns,
     CostRow,
     agents_below,
     joint_actions,
     measure,
     messages,
-    step_formula,
     within_budget,
 )
 from .formats import VARIABLES, format_rows
@@ -67,15 +67,6 @@ class CostTable:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(str(self))}</pre>"
-
-
-class Quantities(TypedDict, total=False):
-    """Arguments of `problems`."""
-
-    memberships: Iterable[int] | None
-    rules: Iterable[int] | None
-    actions: Iterable[int]
-    iterations: int
 
 
 def problems(
@@ -153,7 +144,7 @@ def cost_table(
     budget: int | None = None,
     measured: bool = False,
     network: bool = False,
-    **quantities: Unpack[Quantities],
+    **quantities: Any,
 ) -> CostTable:
     """Return the cost of hierarchies by Eq. 18-23 and, if requested, measured.
 
@@ -199,36 +190,33 @@ def cost_table(
         raise ValueError(f"{count:,} rows, allowed: {MAX_ROWS:,}; name fewer numbers")
     by_case = []
     for (label, text), n in product(_labeled(topologies), numbers):
-        first = CostRow(n, label, PAPER, None, None, None, 0)
-        if measured:
-            first = replace(first, formula=step_formula(text, n), measured=measure(text, n))
-        if network:
-            first = replace(first, network=messages(text, n))
-        by_case.append([_row(first, text, m, problem, budget) for m, problem in each])
+        extra: Columns = messages(text, n) if network else {}
+        extra |= measure(text, n) if measured else {}
+        own = []
+        for memberships, problem in each:
+            row = replace(_row(text, n, problem), topology=label, memberships=memberships)
+            needs = joint_actions(text, n, problem.actions)
+            limited = {} if budget is None else within_budget(row, needs, budget)
+            own.append(replace(row, extra=limited | extra))
+        by_case.append(own)
     return CostTable(tuple(chain.from_iterable(zip(*by_case, strict=True))))
 
 
-def _row(
-    row: CostRow, text: str, memberships: int | None, problem: Problem, budget: int | None
-) -> CostRow:
-    """Return a row with the results of the formulas for a problem."""
-    n = row.agents
+def _row(text: str, n: int, problem: Problem) -> CostRow:
+    """Return the row of a topology over n agents with the results of the formulas."""
     below = () if text in {SINGLE_AGENT, *DECISION_METHODS} else agents_below(text, n)
     is_one = bool(below) and is_chain(below)
     needs = joint_actions(text, n, problem.actions)
-    row = replace(
-        row,
-        problem=problem,
-        memberships=memberships,
+    return CostRow(
+        n,
+        text,
+        problem,
         nested_exact=None if text == SINGLE_AGENT else problem.sweep(needs),
         nested_closed_form=problem.chain_closed_form(n) if is_one else None,
         nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
         single_agent=problem.single_agent(n),
         free=1 + max(below, default=-1),
     )
-    if budget is None:
-        return row
-    return replace(row, within_budget=within_budget(row, needs, budget))
 
 
 def _labeled(topologies: Sequence[str]) -> list[tuple[str, str]]:

@@ -22,7 +22,7 @@ from ...core.interface.scenario import Scenario
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.learners.written import WrittenSettings
-from ...core.plugins.registry import Plugged
+from ...core.plugins.models import Plugged
 from ...core.plugins.settings import (
     FailureSpan,
     ScenarioSettings,
@@ -212,6 +212,12 @@ class Condition(NamedTuple):
     """Stages in which its teams are trained first."""
     same: tuple[str, ...] = ()
     """Labels of equal controls, which are left out."""
+
+    @property
+    def labeled(self) -> dict[str, ConditionSettings]:
+        """Settings of the condition and of its evaluations by label."""
+        others = {f"{self.label}, {name}": settings for name, settings in self.evaluations}
+        return {self.label: self.settings, **others}
 
     @property
     def tables(self) -> list[Any]:

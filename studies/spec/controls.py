@@ -58,26 +58,29 @@ def random_control(condition: str, settings: Mapping[str, Settings]) -> str | No
     """Return the condition that acts at random in the scenario of another one, if there is one."""
     scenario = settings[condition]["scenario"]
     for label, own in settings.items():
-        rule = own["learner"].get("decision", {}).get("rule")
-        if own["learner"]["kind"] == "frozen" and rule == "random" and own["scenario"] == scenario:
+        is_random = own["learner"]["kind"] == "frozen" and _rule_of(own) == "random"
+        if is_random and own["scenario"] == scenario:
             return label
     return None
 
 
 def is_drawn(settings: Settings) -> bool:
     """Return whether a condition that learns nothing draws actions at random, if only by ties."""
-    learner = settings["learner"]
-    rule = learner.get("decision", {}).get("rule")
-    return learner["kind"] == "frozen" and rule not in WITH_REWARDS
+    return settings["learner"]["kind"] == "frozen" and _rule_of(settings) not in WITH_REWARDS
+
+
+def _rule_of(settings: Settings) -> object:
+    """Return the rule of decision; None of a learner without."""
+    return settings["learner"].get("decision", {}).get("rule")
 
 
 def _decision_of(settings: Settings) -> object:
     """Return what tells how zero weights decide."""
     learner = settings["learner"]
-    decision = learner.get("decision", {})
-    if decision.get("rule") not in WITH_REWARDS:
-        return decision.get("rule") == "random"
-    return settings["topology"], decision, learner.get("predictor")
+    rule = _rule_of(settings)
+    if rule not in WITH_REWARDS:
+        return rule == "random"
+    return settings["topology"], learner["decision"], learner.get("predictor")
 
 
 def control_lines(settings: Mapping[str, Settings]) -> tuple[str, ...]:
@@ -94,18 +97,18 @@ def planning_remark(settings: Mapping[str, Settings]) -> str | None:
     settings
         Of all conditions, by label.
     """
-    planning: dict[str, str | None] = {}
-    for condition, own in settings.items():
-        learner = own["learner"]
-        rule = learner.get("decision", {}).get("rule")
-        if learner["kind"] not in LEARN_NOTHING and rule in WITH_REWARDS:
-            planning[condition] = control_of(condition, settings)
+    planning = [
+        condition
+        for condition, own in settings.items()
+        if own["learner"]["kind"] not in LEARN_NOTHING and _rule_of(own) in WITH_REWARDS
+    ]
     if not planning:
         return None
     names = join_names(planning, MOST_NAMES)
-    rules = dict.fromkeys(settings[c]["learner"]["decision"]["rule"] for c in planning)
+    rules = dict.fromkeys(_rule_of(settings[condition]) for condition in planning)
     why = f"untrained weights plan by the reward under rule = {', '.join(map(show, rules))}"
-    controls = list(dict.fromkeys(filter(None, planning.values())))
+    found = (control_of(condition, settings) for condition in planning)
+    controls = list(dict.fromkeys(filter(None, found)))
     if not controls:
         return (
             f"{names}: {why}, and no control learns nothing under the same: judge learning by the "
@@ -143,9 +146,6 @@ def tuning_keys(keys: Iterable[str]) -> list[str]:
     >>> tuning_keys(["learner.ridge", "learner.decision.rule"])
     ['learner.ridge']
     """
-    return sorted({key for key in keys if _tunes_learning(key)})
-
-
-def _tunes_learning(key: str) -> bool:
-    section, _, rest = key.partition(".")
-    return section == "learner" and rest.partition(".")[0] not in LearnerSettings.model_fields
+    learner = (key for key in keys if key.startswith("learner."))
+    fields = LearnerSettings.model_fields
+    return sorted({key for key in learner if key.split(".")[1] not in fields})

@@ -103,12 +103,11 @@ def tables() -> tuple[Table, ...]:
     ['carts']
     """
     whole = _schema(ConditionSettings)
-    walk = _Walk(whole["$defs"])
     return (
         _table("", "", "", _schema(Spec)),
         _table("overrides", "", "", _schema(Override)),
         _table("curriculum", "", "", _schema(StageSettings)),
-        *walk.below("", "", whole, ()),
+        *_below("", "", whole, (), (whole["$defs"], set())),
         _table("learner", OWN_FUNCTION, "", _schema(FunctionSettings)),
     )
 
@@ -165,70 +164,64 @@ def nearest(prefix: str) -> str:
     return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
-class _Walk:
-    """Walk over the tables in a JSON schema, each of which is yielded once.
+Known = tuple[Schema, set[tuple[str, str]]]
+"""Schemas by the name to which ``$ref`` refers, and the tables that have been yielded."""
 
-    Parameters
-    ----------
-    definitions
-        Schemas by the name to which ``$ref`` refers.
+
+def _below(
+    name: str, within: str, table: Schema, above: tuple[str, ...], known: Known
+) -> Iterator[Table]:
+    """Yield the tables that the keys of a table hold, at any depth, each once.
+
+    Things of a registry are not listed again inside things of the same registry, as the learners of
+    the parts of a team are.
     """
+    for key, schema in table["properties"].items():
+        registry = schema.get("title", "")
+        if registry not in above:
+            place = f"{name}.{key}".lstrip(".")
+            inside = (*above, registry) if registry in REGISTRIES else above
+            yield from _tables(place, within, schema, inside, known)
 
-    def __init__(self, definitions: Schema) -> None:
-        self._definitions = definitions
-        self._seen: set[tuple[str, str]] = set()
 
-    def below(
-        self, name: str, within: str, table: Schema, above: tuple[str, ...]
-    ) -> Iterator[Table]:
-        """Yield the tables that the keys of a table hold, at any depth.
+def _tables(
+    name: str, within: str, schema: Schema, above: tuple[str, ...], known: Known
+) -> Iterator[Table]:
+    definitions, seen = known
+    new = [own for own in _objects(schema, definitions) if (name, repr(own)) not in seen]
+    seen |= {(name, repr(own)) for own in new}
+    kinds = [own for own in new if "const" in own["properties"].get("kind", ())]
+    common: Schema = {}
+    if kinds:
+        properties = [own["properties"] for own in kinds]
+        common = {
+            key: value
+            for key, value in properties[0].items()
+            if key != "kind" and all(own.get(key) == value for own in properties)
+        }
+        table = _table(name, "", within, {"properties": common})
+        names = [own["kind"]["const"] for own in properties]
+        yield table._replace(keys=(_kind(schema, names), *table.keys))
+    for own in new:
+        rest = {key: v for key, v in own["properties"].items() if key not in common}
+        kind = own["properties"]["kind"]["const"] if own in kinds else ""
+        if rest:
+            yield _table(name, kind, within, {**own, "properties": rest})
+        yield from _below(name, kind or within, own, above, known)
 
-        Things of a registry are not listed again inside things of the same registry, as the
-        learners of the parts of a team are.
-        """
-        for key, schema in table["properties"].items():
-            registry = schema.get("title", "")
-            if registry not in above:
-                place = f"{name}.{key}".lstrip(".")
-                inside = (*above, registry) if registry in REGISTRIES else above
-                yield from self._tables(place, within, schema, inside)
 
-    def _tables(
-        self, name: str, within: str, schema: Schema, above: tuple[str, ...]
-    ) -> Iterator[Table]:
-        new = [own for own in self._objects(schema) if (name, repr(own)) not in self._seen]
-        self._seen |= {(name, repr(own)) for own in new}
-        kinds = [own for own in new if "const" in own["properties"].get("kind", ())]
-        common: Schema = {}
-        if kinds:
-            properties = [own["properties"] for own in kinds]
-            common = {
-                key: value
-                for key, value in properties[0].items()
-                if key != "kind" and all(own.get(key) == value for own in properties)
-            }
-            table = _table(name, "", within, {"properties": common})
-            names = [own["properties"]["kind"]["const"] for own in kinds]
-            yield table._replace(keys=(_kind(schema, names), *table.keys))
-        for own in new:
-            rest = {key: v for key, v in own["properties"].items() if key not in common}
-            kind = own["properties"]["kind"]["const"] if own in kinds else ""
-            if rest:
-                yield _table(name, kind, within, {**own, "properties": rest})
-            yield from self.below(name, kind or within, own, above)
-
-    def _objects(self, schema: Schema) -> Iterator[Schema]:
-        """Yield the schemas of the tables that a key may hold."""
-        if "$ref" in schema:
-            if schema["$ref"].endswith(NESTED_LISTS):
-                return
-            schema = self._definitions[schema["$ref"].rpartition("/")[2]]
-        if "properties" in schema and "title" in schema:
-            yield schema
-        inner = [schema.get(word) for word in ("items", "additionalProperties")]
-        for one in [*schema.get("anyOf", ()), *inner]:
-            if isinstance(one, Mapping):
-                yield from self._objects(dict(one))
+def _objects(schema: Schema, definitions: Schema) -> Iterator[Schema]:
+    """Yield the schemas of the tables that a key may hold."""
+    if "$ref" in schema:
+        if schema["$ref"].endswith(NESTED_LISTS):
+            return
+        schema = definitions[schema["$ref"].rpartition("/")[2]]
+    if "properties" in schema and "title" in schema:
+        yield schema
+    inner = [schema.get(word) for word in ("items", "additionalProperties")]
+    for one in [*schema.get("anyOf", ()), *inner]:
+        if isinstance(one, Mapping):
+            yield from _objects(dict(one), definitions)
 
 
 def _kind(schema: Schema, kinds: Sequence[str]) -> Key:
@@ -240,7 +233,7 @@ def _kind(schema: Schema, kinds: Sequence[str]) -> Key:
 
 
 def _table(name: str, kind: str, within: str, schema: Schema) -> Table:
-    preset = dict(flat(PRESETS["default"].table))
+    preset = dict(flat(PRESETS["default"]))
     if kind not in ("", preset.get(f"{name}.kind")):
         preset = {}
     required = schema.get("required", ())

@@ -9,27 +9,13 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .tables import SpecTable
 
-
-class Preset(NamedTuple):
-    """A named fragment of a spec."""
-
-    summary: str
-    """Description in one line."""
-    table: SpecTable
-    """The tables `scenario`, `topology` and `learner` as in a spec."""
-    other_scenarios: SpecTable
-    """Changes for scenarios of another kind."""
-
-
-_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-
-PRESETS = {
-    name: Preset(table.pop("summary"), table, table.pop("other_scenarios", {}))
-    for name, table in _TABLES.items()
-}
-"""Every preset by name."""
+PRESETS: dict[str, SpecTable] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
+"""Every preset by name: the tables `scenario`, `topology` and `learner` as in a spec; `summary`, a
+description in one line; and `other_scenarios`, changes for scenarios of another kind."""

@@ -16,14 +16,15 @@ from typing import NamedTuple
 
 from pydantic import ValidationError
 
+from ...core.plugins.models import tuples
 from ...core.plugins.problems import explain, misplaced, several
-from ...core.plugins.settings import Settings, tuples
+from ...core.plugins.settings import Settings
 from ...core.plugins.words import closest, show
 from ...topologies.config import parse
 from ..errors import SpecError, refused
 from .conditions import Condition, ConditionSettings, Override, Stage, StageSettings
 from .controls import LEARN_NOTHING, for_control
-from .presets import PRESETS, Preset
+from .presets import PRESETS
 from .tables import SWEEP, SpecTable, TomlTable, column_value, flat, label, merge, nested, override
 
 SECTIONS = ("scenario", "topology", "learner")
@@ -73,11 +74,11 @@ def resolve(
         If the preset is unknown or a value is refused; one line.
     """
     own = _preset(preset, where)
-    base = own.table
+    base: SpecTable = {name: own[name] for name in SECTIONS if name in own}
     table = override({"scenario": base["scenario"]}, {"scenario": user.get("scenario", {})})
     scenario = _validate(table, where).scenario
     if scenario.kind != base["scenario"]["kind"]:
-        base = merge(base, own.other_scenarios)
+        base = merge(base, own.get("other_scenarios", {}))
     base = override(base, expand_sections(scenario.scenario_defaults(str(preset))))
     for key in unset:
         base = _without(base, key, where)
@@ -125,38 +126,36 @@ def conditions_of(spec: UserTables) -> tuple[Condition, ...]:
     return tuple(conditions.values())
 
 
+NO_OVERRIDE = Override.model_construct(name="")
+"""Override of a spec without any."""
+
+
 def _points(
     overrides: Sequence[Override], sweep: Mapping[str, Sequence[object]]
-) -> Iterator[tuple[Override | None, Point]]:
-    for table in overrides or (None,):
-        crossed = {**(table.sweep if table else {}), **sweep}
+) -> Iterator[tuple[Override, Point]]:
+    for table in overrides or (NO_OVERRIDE,):
+        crossed = {**table.sweep, **sweep}
         for values in itertools.product(*crossed.values()):
             yield table, dict(zip(crossed, values, strict=True))
 
 
-def _condition(
-    spec: UserTables, table: Override | None, point: Point, keys: Iterable[str]
-) -> Condition:
-    """Return the condition of an override (None for the spec alone) and a point of the sweeps."""
-    name = label(point, table.name if table else "") or spec.preset
-    where = f" (condition {name!r})" if point or table else ""
-    preset = point.get("preset", table.preset if table and table.preset else spec.preset)
+def _condition(spec: UserTables, table: Override, point: Point, keys: Iterable[str]) -> Condition:
+    """Return the condition of an override and a point of the sweeps."""
+    name = label(point, table.name) or spec.preset
+    where = f" (condition {name!r})" if point or table.name else ""
+    preset = point.get("preset", table.preset or spec.preset)
     user = spec.sections
-    if table and table.preset and "preset" not in point:
-        user = for_control(_preset(preset, where).table["learner"], user)
-    layers = [sections_of(table)] if table else []
-    layers += [expand_sections(nested(key, v)) for key, v in point.items() if key != "preset"]
-    for layer in layers:
+    if table.preset and "preset" not in point:
+        user = for_control(_preset(preset, where)["learner"], user)
+    sections = sections_of(table)
+    points = (expand_sections(nested(key, v)) for key, v in point.items() if key != "preset")
+    for layer in (sections, *points):
         user = merge(for_control(layer.get("learner", {}), user), layer)
     if "preset" in point:
-        user = for_control(_preset(preset, where).table["learner"], user)
-    unset = (*spec.unset, *(table.unset if table else ()))
-    settings = resolve(preset, user, where, unset)
-    curriculum = spec.curriculum
-    if table and table.curriculum is not None:
-        curriculum = table.curriculum
+        user = for_control(_preset(preset, where)["learner"], user)
+    settings = resolve(preset, user, where, (*spec.unset, *table.unset))
     stages = []
-    for stage in curriculum:
+    for stage in spec.curriculum if table.curriculum is None else table.curriculum:
         changed = _changed(
             settings, {"scenario": stage.scenario}, f" (stage {stage.name!r}){where}"
         )
@@ -165,15 +164,14 @@ def _condition(
         (other, _reevaluation(settings, changes, f" (evaluation {other!r}){where}"))
         for other, changes in spec.evaluations.items()
     ]
-    columns: Point = {"name": table.name} if table else {}
-    own = flat(sections_of(table) if table else {})
-    values = {**{key: value for key, value in own if value != {}}, **point}
+    columns: Point = {"name": table.name} if table.name else {}
+    values = {**{key: value for key, value in flat(sections) if value != {}}, **point}
     columns |= {key: column_value(values[key]) if key in values else "" for key in keys}
     columns = columns or {"preset": spec.preset}
     return Condition(name, columns, settings, tuple(evaluations), tuple(stages))
 
 
-def _preset(name: object, where: str) -> Preset:
+def _preset(name: object, where: str) -> SpecTable:
     if not isinstance(name, str) or name not in PRESETS:
         raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
     return PRESETS[name]
@@ -274,7 +272,7 @@ def known_tables(table: SpecTable) -> tuple[type[Settings], TomlTable]:
     """
     preset = PRESETS.get(str(table.get("preset", "default")), PRESETS["default"])
     own = {name: table[name] for name in SECTIONS if isinstance(table.get(name), Mapping)}
-    return ConditionSettings, override(preset.table, own) if table else {}
+    return ConditionSettings, override(preset, own) if table else {}
 
 
 def _sweep(

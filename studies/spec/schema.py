@@ -43,14 +43,6 @@ class KeySchema(GenerateJsonSchema):
         return {"anyOf": union["oneOf"]}
 
 
-class SpecSchema(KeySchema):
-    """Generator of the schema of the tables of a spec."""
-
-    def field_is_required(self, field: object, total: bool) -> bool:
-        """Return False: a preset may have the key."""
-        return False
-
-
 def schema() -> Schema:
     """Return the JSON schema of specs.
 
@@ -61,7 +53,7 @@ def schema() -> Schema:
     """
     models = (Spec, Override, StageSettings, ConditionSettings)
     _, whole = models_json_schema(
-        [(model, "validation") for model in models], schema_generator=SpecSchema
+        [(model, "validation") for model in models], schema_generator=KeySchema
     )
     definitions = whole["$defs"]
     sections = definitions.pop("ConditionSettings")["properties"]
@@ -69,8 +61,6 @@ def schema() -> Schema:
         keys = definitions[name]["properties"]
         for section in sections.keys() & keys.keys():
             keys[section] = sections[section] | {"description": keys[section]["description"]}
-    definitions["Override"]["required"] = ["name"]
-    definitions["StageSettings"]["required"] = ["name", "episodes"]
     lists = {"anyOf": [{"type": "array"}, LISTS]}
     definitions["lists"] = {"type": "object", "additionalProperties": lists}
     spec = definitions.pop("Spec")
@@ -86,14 +76,17 @@ def schema() -> Schema:
     definitions["Override"]["properties"]["sweep"] = LISTS
     shared: Schema = {}
     spec, definitions = (_share(part, shared) for part in (spec, definitions))
+    definitions["Override"]["required"] = ["name"]
+    definitions["StageSettings"]["required"] = ["name", "episodes"]
     title = "A spec of nested-agents"
     return {"$schema": DIALECT, "title": title, **spec, "$defs": definitions | shared}
 
 
 def _share(part: Any, shared: Schema) -> Any:
-    """Return a part of a schema with references to the tables of registries, without other titles.
+    """Return a part of a schema with references to the tables of registries.
 
-    Each table is added to `shared` under the name of its registry.
+    Each table is added to `shared` under the name of its registry. Other titles are left out, and
+    required keys, because a preset may have them.
     """
     if isinstance(part, list):
         return [_share(item, shared) for item in part]
@@ -102,7 +95,7 @@ def _share(part: Any, shared: Schema) -> Any:
     plain = {
         key: _share(value, shared)
         for key, value in part.items()
-        if key != "title" or isinstance(value, dict)
+        if key not in ("title", "required") or isinstance(value, dict)
     }
     name = part.get("title")
     if name not in REGISTRIES or "anyOf" not in plain:

@@ -21,8 +21,9 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from ...core.agents.joint import Granularity
+from ...core.plugins.models import tuples
 from ...core.plugins.problems import explain
-from ...core.plugins.settings import Settings, tuples
+from ...core.plugins.settings import Settings
 from ...core.plugins.sources import Sources, is_reference, mentions
 from ...core.plugins.trust import modules_in
 from ...core.plugins.words import closest, expect

@@ -10,7 +10,7 @@ import shutil
 import sqlite3
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
@@ -59,24 +59,12 @@ HEADER_BYTES = 100
 """Size of the header of a database. Every commit changes a counter in it."""
 
 
-class DamageError(SpecError):
-    """A database does not hold what was written."""
-
-    def __init__(self, path: Path, reason: str) -> None:
-        super().__init__(
-            f"{path}: is damaged: {reason}; nothing in this directory has been changed: restore "
-            "the file from a copy, or run the study in another directory"
-        )
-
-
-class NoLocksError(SpecError):
-    """A file system has no locks, so two processes could write at once."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(
-            f"{path}: this file system has no file locks; write on a local disk and copy the "
-            "directory afterwards, or mount it with locks (NFS: without nolock; Lustre: flock)"
-        )
+def damaged(path: Path, reason: str) -> SpecError:
+    """Return the error of a database that does not hold what was written."""
+    return SpecError(
+        f"{path}: is damaged: {reason}; nothing in this directory has been changed: restore the "
+        "file from a copy, or run the study in another directory"
+    )
 
 
 @contextmanager
@@ -85,10 +73,8 @@ def open_to_write(path: Path) -> Iterator[sqlite3.Connection]:
 
     Raises
     ------
-    DamageError
-        If the database is damaged.
     SpecError
-        If it cannot be used, or the disk is full.
+        If the database is damaged, or it cannot be used, or the disk is full.
     """
     with _one_line_errors(path), closing(_connect(path, WRITE_TIMEOUT_S)) as connection:
         connection.execute("PRAGMA synchronous = EXTRA")
@@ -97,7 +83,7 @@ def open_to_write(path: Path) -> Iterator[sqlite3.Connection]:
 
 
 @contextmanager
-def open_to_read(path: Path, waits: Iterable[float] = COPY_WAITS_S) -> Iterator[sqlite3.Connection]:
+def open_to_read(path: Path) -> Iterator[sqlite3.Connection]:
     """Connect to a copy of one committed state of an existing database.
 
     Where the database cannot be opened, its files are copied: there may be no locks, or SQLite may
@@ -105,19 +91,10 @@ def open_to_read(path: Path, waits: Iterable[float] = COPY_WAITS_S) -> Iterator[
     journal reverts every change that the copy may contain in part, unless another transaction began
     in between. Such an attempt is discarded.
 
-    Parameters
-    ----------
-    path
-        The database.
-    waits
-        Wait before each attempt to copy the files [s].
-
     Raises
     ------
-    DamageError
-        If the database is damaged.
     SpecError
-        If it cannot be read, or a writer interfered with every attempt.
+        If the database is damaged, or it cannot be read, or a writer interfered with every attempt.
     """
     with _one_line_errors(path), tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
@@ -131,14 +108,14 @@ def open_to_read(path: Path, waits: Iterable[float] = COPY_WAITS_S) -> Iterator[
                 target.execute("PRAGMA synchronous = OFF")
                 source.backup(target)
         except sqlite3.OperationalError:
-            _copy_files(path, copy, waits)
+            _copy_files(path, copy)
         with closing(_connect(copy)) as connection:
             yield connection
 
 
-def _copy_files(path: Path, copy: Path, waits: Iterable[float]) -> None:
+def _copy_files(path: Path, copy: Path) -> None:
     """Copy the files of a database, see `open_to_read`."""
-    for wait in waits:
+    for wait in COPY_WAITS_S:
         time.sleep(wait)
         before = _generation(path)
         for suffix in ("", *SIDE_FILES):
@@ -205,7 +182,7 @@ def _one_line_errors(path: Path) -> Iterator[None]:
     except sqlite3.DatabaseError as error:
         raise _explain(path, error) from None
     except UnicodeDecodeError as error:  # of SQLite's message, which quotes the damaged text
-        raise DamageError(path, str(error)) from None
+        raise damaged(path, str(error)) from None
 
 
 def _explain(path: Path, error: sqlite3.DatabaseError) -> SpecError:
@@ -213,7 +190,7 @@ def _explain(path: Path, error: sqlite3.DatabaseError) -> SpecError:
     # An error that Python's module raises itself has no code.
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
     if code not in CIRCUMSTANCES:
-        return DamageError(path, str(error))
+        return damaged(path, str(error))
     if code != sqlite3.SQLITE_IOERR:
         return SpecError(f"{path}: {error}")
     # SQLite reports some cases of a full disk as an input/output error.

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..errors import SpecError
 from . import database
 from .checksums import study_checksum
-from .connection import CIRCUMSTANCES, DECODE_ERRORS, DamageError
+from .connection import CIRCUMSTANCES, DECODE_ERRORS, damaged
 from .database import TABLES_OF_TRIALS, NoStudyError
 
 ERROR_CODE = re.compile(r"error code=(\d+)")
@@ -28,10 +28,8 @@ def check_study(path: Path, db: sqlite3.Connection) -> int:
     ------
     NoStudyError
         If the database is empty.
-    DamageError
-        If it is damaged.
     SpecError
-        If it has been written by a newer version, or does not belong to a study.
+        If it is damaged, or it has been written by a newer version, or does not belong to a study.
     """
     try:
         _check_file(path, db)
@@ -45,7 +43,7 @@ def check_study(path: Path, db: sqlite3.Connection) -> int:
         if version.isdecimal() and int(version) < database.RESULTS_VERSION:
             return int(version)
         if meta.get("sha256") != study_checksum(db):
-            raise DamageError(
+            raise damaged(
                 path,
                 "the description of the study does not match its checksum; a study of an earlier "
                 "development version of nested-agents looks the same",
@@ -54,7 +52,7 @@ def check_study(path: Path, db: sqlite3.Connection) -> int:
         return int(version)
     except DECODE_ERRORS as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise DamageError(path, reason) from None
+        raise damaged(path, reason) from None
 
 
 def _check_file(path: Path, db: sqlite3.Connection) -> None:
@@ -64,10 +62,8 @@ def _check_file(path: Path, db: sqlite3.Connection) -> None:
     ------
     NoStudyError
         If the database is empty.
-    DamageError
-        If SQLite finds damage, or there are pages without tables.
     SpecError
-        If the database is not of a study, or SQLite cannot read it.
+        If SQLite finds damage or cannot read the database, or it is not of a study.
     MemoryError
         If SQLite runs out of memory.
     """
@@ -75,7 +71,7 @@ def _check_file(path: Path, db: sqlite3.Connection) -> None:
     if not tables:
         (pages,) = db.execute("PRAGMA page_count").fetchone()
         if pages > 1:
-            raise DamageError(path, "it has no tables")
+            raise damaged(path, "it has no tables")
         raise NoStudyError(f"{path}: is empty, it holds no study yet")
     if not tables & {"meta", *TABLES_OF_TRIALS}:
         raise SpecError(f"{path}: is a database, but no study; use another directory")
@@ -88,7 +84,7 @@ def _check_file(path: Path, db: sqlite3.Connection) -> None:
             raise MemoryError
         if code & 0xFF in CIRCUMSTANCES and code != sqlite3.SQLITE_IOERR_SHORT_READ:
             raise SpecError(f"{path}: cannot be read: SQLite error {code}")
-    raise DamageError(path, " ".join(str(answer).replace("*** in database main ***", "").split()))
+    raise damaged(path, " ".join(str(answer).replace("*** in database main ***", "").split()))
 
 
 def _check_planned(path: Path, db: sqlite3.Connection) -> None:
@@ -99,4 +95,4 @@ def _check_planned(path: Path, db: sqlite3.Connection) -> None:
         query = "SELECT condition, seed FROM trials WHERE identity IS ?"
         trial = db.execute(query, row).fetchone()
         name = f"trial {row[0]}" if trial is None else f"{trial[0]}, seed {trial[1]}"
-        raise DamageError(path, f"it holds rows of a trial that is not of this study: {name}")
+        raise damaged(path, f"it holds rows of a trial that is not of this study: {name}")

@@ -66,11 +66,9 @@ class Store:
         ------
         NoStudyError
             If the directory holds no study.
-        DamageError
-            If the database is damaged as a whole; see `verify` for the rows of its trials.
         SpecError
-            If it cannot be read for another reason, has been written by a newer version, or does
-            not belong to a study.
+            If it is damaged as a whole, see `verify` for the rows of its trials; it cannot be read
+            for another reason, has been written by a newer version, or does not belong to a study.
         """
         path = directory / DATABASE
         if not path.exists():

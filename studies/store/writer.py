@@ -11,7 +11,7 @@ from typing import TextIO
 from ...core import locks
 from ..errors import SpecError
 from . import durable
-from .connection import NO_LOCKS, NoLocksError
+from .connection import NO_LOCKS
 
 LOCK = ".lock"
 """Name of the file that the writing process locks."""
@@ -51,7 +51,11 @@ def _take(lock: TextIO, directory: Path) -> None:
             return
         except OSError as error:
             if error.errno in NO_LOCKS:
-                raise NoLocksError(directory) from None
+                raise SpecError(
+                    f"{directory}: this file system has no file locks; write on a local disk and "
+                    "copy the directory afterwards, or mount it with locks (NFS: without nolock; "
+                    "Lustre: flock)"
+                ) from None
             time.sleep(wait)
     raise SpecError(f"{directory}: another process is writing there")
 

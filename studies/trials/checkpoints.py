@@ -12,18 +12,15 @@ import hashlib
 import io
 import json
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ...core.interface.agents import select_prefix
 from ...core.learners import LEARNERS
-from ...core.plugins.sources import Checkpoints
 from ..store.durable import Recording, read_bytes, write
-from .episodes import EpisodeRow
 from .trial import Trial
 
 TABLE = "table"
@@ -32,97 +29,66 @@ DIGEST_LENGTH = 64
 """Number of characters before the arrays."""
 
 
-class CheckpointState(NamedTuple):
-    """State of a running trial."""
-
-    rows: Sequence[EpisodeRow]
-    """Episodes so far."""
-    seconds: Mapping[str, float]
-    """Duration of each part of the control loop [s]."""
-    usage: Mapping[str, float]
-    """Other resources that the trial has used, by name."""
-    training_cpu_s: float
-    """Processor time of `Session.train_until` [s]."""
-    recordings: Mapping[str, Recording]
-    """Recordings as in `TrialResult`."""
-    team: Recording
-    """State of the team."""
-
-
 class Checkpoint:
-    """The checkpoint file of a trial."""
+    """The checkpoint file of a trial; see `Sources.checkpoints` for its folder.
+
+    The state of user code is unknown, so a trial with user code has none.
+    """
 
     def __init__(self, trial: Trial) -> None:
-        self._location = location(trial)
-        self._identity = trial.identity
-        self._next = time.monotonic() + (self._location.seconds if self._location else 0.0)
+        is_built_in = trial.settings.learner.kind in LEARNERS.built_in
+        has_own_code = any(name.endswith(".py") for name in trial.sources.texts)
+        checkpoints = trial.sources.checkpoints if is_built_in and not has_own_code else None
+        self._path: Path | None = None
+        self._seconds = 0.0
+        self._origin = [trial.identity, ""]
+        if checkpoints is not None:
+            folder, self._seconds, self._origin[1] = checkpoints
+            self._path = folder / f"{trial.identity}.npz"
+        self._next = time.monotonic() + self._seconds
 
     @property
     def is_due(self) -> bool:
         """Whether it is time to write a checkpoint."""
-        return self._location is not None and time.monotonic() >= self._next
+        return self._path is not None and time.monotonic() >= self._next
 
-    def write(self, state: CheckpointState) -> None:
-        """Replace the file. If it cannot be written, the trial continues without it."""
-        if self._location is None:
+    def write(self, table: Mapping[str, Any], groups: Mapping[str, Recording]) -> None:
+        """Replace the file by a JSON table and groups of arrays.
+
+        If it cannot be written, the trial continues without it.
+        """
+        if self._path is None:
             return
-        table = {
-            "identity": self._identity,
-            "code": self._location.code,
-            "rows": [[*row] for row in state.rows],
-            "seconds": dict(state.seconds),
-            "usage": dict(state.usage),
-            "training_cpu_s": state.training_cpu_s,
-        }
-        groups = {f"recordings/{name}": arrays for name, arrays in state.recordings.items()}
-        groups["team"] = state.team
         arrays = {
             f"{group}/{k}": array for group, own in groups.items() for k, array in own.items()
         }
-        text = np.frombuffer(json.dumps(table, allow_nan=False).encode(), np.uint8)
+        text = json.dumps({**table, "origin": self._origin}, allow_nan=False)
         buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, **{TABLE: text, **arrays})
+        arrays[TABLE] = np.frombuffer(text.encode(), np.uint8)
+        np.savez(buffer, allow_pickle=False, **arrays)
         content = buffer.getvalue()
         digest = hashlib.sha256(content).hexdigest().encode()
         with suppress(OSError, ValueError):
-            write(self._location.file(self._identity), digest + content)
-        self._next = time.monotonic() + self._location.seconds
+            write(self._path, digest + content)
+        self._next = time.monotonic() + self._seconds
 
-    def read(self) -> CheckpointState | None:
-        """Return the saved state; None if there is none from which this trial can resume."""
-        if self._location is None:
+    def read(self) -> tuple[dict[str, Any], dict[str, Recording]] | None:
+        """Return table and arrays; None if there are none from which this trial can resume."""
+        if self._path is None:
             return None
         try:
-            content = _content(self._location.file(self._identity))
+            content = _content(self._path)
             if content is None:
                 return None
+            groups: dict[str, Recording] = {}
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
-                arrays = dict(file)
-            table = json.loads(arrays.pop(TABLE).tobytes())
-            if (table["identity"], table["code"]) != (self._identity, self._location.code):
-                return None
-            names = {key.split("/", 2)[1]: None for key in arrays if key.startswith("recordings/")}
-            return CheckpointState(
-                rows=[EpisodeRow(*row) for row in table["rows"]],
-                seconds=table["seconds"],
-                usage=table["usage"],
-                training_cpu_s=float(table["training_cpu_s"]),
-                recordings={name: select_prefix(f"recordings/{name}/", arrays) for name in names},
-                team=select_prefix("team/", arrays),
-            )
+                table = json.loads(file[TABLE].tobytes())
+                for key in file.files:
+                    group, _, name = key.partition("/")
+                    groups.setdefault(group, {})[name] = file[key]
         except (OSError, ValueError, KeyError, TypeError, EOFError):
             return None
-
-
-def location(trial: Trial) -> Checkpoints | None:
-    """Return where the checkpoint of a trial is stored; None if it has none.
-
-    The state of user code is unknown, so a trial with user code starts from the beginning.
-    """
-    is_built_in = trial.settings.learner.kind in LEARNERS.built_in
-    if not is_built_in or any(name.endswith(".py") for name in trial.sources.texts):
-        return None
-    return trial.sources.checkpoints
+        return (table, groups) if table.get("origin") == self._origin else None
 
 
 def remove_damaged(folder: Path) -> Iterator[str]:

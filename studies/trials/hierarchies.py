@@ -1,11 +1,10 @@
 """Distinct hierarchies of a study's conditions and evaluations."""
 
-from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 from ...topologies.view import HierarchyView
 from ..errors import refused
-from ..spec.conditions import ConditionSettings
 from ..spec.spec import Spec
 
 
@@ -26,7 +25,8 @@ def hierarchies_of(spec: Spec, limit: int | None = None) -> list[HierarchyView]:
     """
     worlds = set[object]()
     views: dict[object, HierarchyView] = {}
-    for label, settings in _labeled(spec):
+    labeled = chain.from_iterable(own.labeled.items() for own in spec.conditions())
+    for label, settings in labeled:
         world = settings.scenario.model_dump_json(), settings.agents, settings.topology
         if world in worlds:
             continue
@@ -45,10 +45,3 @@ def hierarchies_of(spec: Spec, limit: int | None = None) -> list[HierarchyView]:
         else:
             views[content] = HierarchyView(label, hierarchy, scenario.groups, n_actions, failures)
     return list(views.values())
-
-
-def _labeled(spec: Spec) -> Iterator[tuple[str, ConditionSettings]]:
-    for condition in spec.conditions():
-        yield condition.label, condition.settings
-        for name, settings in condition.evaluations:
-            yield f"{condition.label}, {name}", settings

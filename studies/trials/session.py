@@ -24,26 +24,9 @@ from ..spec.controls import LEARN_NOTHING
 from ..store.database import EVALUATION, STAGE
 from ..store.durable import TEAM, Recording
 from .arrangement import Arrangement, arrange, teach, transfer
-from .checkpoints import Checkpoint, CheckpointState
+from .checkpoints import Checkpoint
 from .episodes import EpisodeMeter, EpisodeRow, join_measures
 from .trial import Trial, TrialResult
-
-
-class Stopwatch:
-    """Total duration of each part of the control loop, and the duration of each decision."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.0)
-        self.decisions: list[float] = []
-
-    def add(self, record: StepRecord) -> None:
-        """Add one step."""
-        seconds = {"decision": record.deciding, "learning": record.learning}
-        seconds |= record.transition.info.get("seconds", {})
-        for part in self.seconds:
-            self.seconds[part] += seconds.get(part, 0.0)
-        self.decisions.append(record.deciding)
-
 
 EVALUATION_WORLDS = 10**6
 """Number of the first evaluation episode. It exceeds all training episodes and is always equal."""
@@ -53,6 +36,9 @@ CURRICULUM_WORLDS = 2 * 10**6
 
 SAMPLED = f"{EVALUATION}sampled actions"
 """Phase of the evaluation with sampled instead of most probable actions."""
+
+RECORDED = "recordings:"
+"""Prefix of the groups of arrays in a checkpoint that hold recordings."""
 
 Observer = Callable[[StepRecord], None]
 """Function that is called after every step of some episodes."""
@@ -91,9 +77,9 @@ class Session:
         self._rows: list[EpisodeRow] = []
         self._measures = self._own.measures
         self._recordings: dict[str, Recording] = {}
-        self._watch = Stopwatch()
+        self._seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.0)
         self._decisions = 0
-        self.decision_seconds = self._watch.decisions
+        self.decision_seconds: list[float] = []
         self.usage: dict[str, float] = {}
         self.training_cpu_s = 0.0
         self._checkpoint: Checkpoint | None = None
@@ -109,20 +95,20 @@ class Session:
         state = checkpoint.read()
         if state is not None:
             try:
-                session._load_state(state)
+                session._load_state(*state)
             except Exception:  # a checkpoint of another team may fail anywhere
                 session = cls(trial)
         session._checkpoint = checkpoint
         return session
 
-    def _load_state(self, state: CheckpointState) -> None:
-        self.team.load_state_dict(state.team)
-        self._rows = list(state.rows)
-        self.training_cpu_s = state.training_cpu_s
+    def _load_state(self, table: Mapping[str, Any], groups: Mapping[str, Recording]) -> None:
+        self.team.load_state_dict(groups.get("team", {}))
+        self._rows = [EpisodeRow(*row) for row in table["rows"]]
+        self.training_cpu_s = table["training_cpu_s"]
         self._decisions = sum(row.steps for row in self._training_rows)
-        self._recordings = dict(state.recordings)
-        self._watch.seconds.update(state.seconds)
-        self.usage = dict(state.usage)
+        self._recordings = {name: groups[f"{RECORDED}{name}"] for name in table["recordings"]}
+        self._seconds.update(table["seconds"])
+        self.usage = table["usage"]
         self._stages = ()
 
     def save_checkpoint(self) -> None:
@@ -133,16 +119,16 @@ class Session:
         is_parallel = self.trial.settings.learner.n_environments > 1
         if is_parallel or self._checkpoint is None or not self._checkpoint.is_due:
             return
-        self._checkpoint.write(
-            CheckpointState(
-                self._rows,
-                self._watch.seconds,
-                self.usage,
-                self.training_cpu_s,
-                self._recordings,
-                self.team.state_dict(),
-            )
-        )
+        table = {
+            "rows": self._rows,
+            "training_cpu_s": self.training_cpu_s,
+            "recordings": list(self._recordings),
+            "seconds": self._seconds,
+            "usage": self.usage,
+        }
+        groups = {f"{RECORDED}{name}": arrays for name, arrays in self._recordings.items()}
+        groups["team"] = self.team.state_dict()
+        self._checkpoint.write(table, groups)
 
     @property
     def phases(self) -> set[str]:
@@ -190,7 +176,7 @@ class Session:
         if team is not None:
             arrangement = self._own._replace(team=team)
         else:
-            observers.append(self._watch.add)
+            observers.append(self._time)
             is_recorded = isinstance(self.world, Recorded) and len(self.world.recorded) > 0
             if is_recorded and self.trial.recorded:
                 observers.append(self._record)
@@ -240,7 +226,15 @@ class Session:
                 self._rows.append(row)
                 done += 1
             self.training_cpu_s = process_time() - start_cpu_s
-        self._watch.seconds["learning"] += working_seconds() - start
+        self._seconds["learning"] += working_seconds() - start
+
+    def _time(self, record: StepRecord) -> None:
+        """Add the durations of a step."""
+        seconds = {"decision": record.deciding, "learning": record.learning}
+        seconds |= record.transition.info.get("seconds", {})
+        for part in self._seconds:
+            self._seconds[part] += seconds.get(part, 0.0)
+        self.decision_seconds.append(record.deciding)
 
     def _record(self, record: StepRecord) -> None:
         """Record a step if `Trial.recorded` contains its episode."""
@@ -369,7 +363,7 @@ class Session:
         if TEAM not in self._recordings:  # the team has not been evaluated
             self._store_team()
         return TrialResult(
-            tuple(self._rows), self._measures, self._recordings, self._watch.seconds,
+            tuple(self._rows), self._measures, self._recordings, self._seconds,
             numbers or {}, usage or {},
         )  # fmt: skip
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +18,15 @@ from ...core.plugins.settings import Settings, changed_values
 from ...core.plugins.sources import Sources, files_in
 from ..spec.conditions import ConditionSettings, Stage
 from ..spec.outline import lengths
-from ..spec.tables import SpecTable
 from ..store.database import RESULTS_VERSION, Planned
 from ..store.durable import Recording
 from .episodes import EpisodeRow
 
 if TYPE_CHECKING:
     from ..spec.spec import Spec
+
+LENGTHS = ("episodes", "steps", "evaluation", "evaluation_steps", "decisions")
+"""Lengths of a trial, which are a part of its identity."""
 
 
 @dataclass(frozen=True)
@@ -60,20 +62,13 @@ class Trial:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The class of settings of user code exists only after its file has been run.
-        evaluations = [(name, other.model_dump()) for name, other in self.evaluations]
-        curriculum = [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum]
-        plain = {
-            "study": self.study,
-            "condition": self.condition,
-            "seed": self.seed,
-            "episodes": self.episodes,
-            "steps": self.steps,
-            "evaluation": self.evaluation,
-            "evaluation_steps": self.evaluation_steps,
-            "decisions": self.decisions,
-            "keep_teams": self.keep_teams,
+        content = {one.name: vars(self)[one.name] for one in fields(self)}
+        content |= {
+            "settings": self.settings.model_dump(),
+            "evaluations": [(name, other.model_dump()) for name, other in self.evaluations],
+            "curriculum": [(*s[:2], s.scenario.model_dump()) for s in self.curriculum],
         }
-        return unpickle, (self.sources, self.settings.model_dump(), evaluations, curriculum, plain)
+        return unpickle, (content,)
 
     @cached_property
     def identity(self) -> str:
@@ -90,11 +85,7 @@ class Trial:
             "version": RESULTS_VERSION,
             "study": self.study,
             "settings": changed_values(self.settings),
-            "episodes": self.episodes,
-            "steps": self.steps,
-            "evaluation": self.evaluation,
-            "evaluation_steps": self.evaluation_steps,
-            "decisions": self.decisions,
+            **{name: vars(self)[name] for name in LENGTHS},
             "evaluations": [[name, changed_values(own)] for name, own in evaluations.items()],
             "curriculum": [
                 [stage.name, stage.episodes, changed_values(stage.scenario)]
@@ -196,21 +187,15 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
     return tuple(trial.with_seed(seed) for seed in spec.seeds for trial in first)
 
 
-def unpickle(
-    sources: Sources,
-    settings: SpecTable,
-    evaluations: Sequence[tuple[str, SpecTable]],
-    curriculum: Sequence[tuple[str, int, SpecTable]],
-    plain: SpecTable,
-) -> Trial:
+def unpickle(content: dict[str, Any]) -> Trial:
     """Return a pickled trial; the classes in its files validate its settings."""
     build = partial(ConditionSettings.model_validate, strict=True)
-    with sources.active():
-        stages = [Stage(n, k, build({"scenario": table}).scenario) for n, k, table in curriculum]
-        return Trial(
-            settings=build(settings),
-            evaluations=tuple((name, build(table)) for name, table in evaluations),
-            curriculum=tuple(stages),
-            sources=sources,
-            **plain,
+    with content["sources"].active():
+        content["settings"] = build(content["settings"])
+        evaluations = ((name, build(table)) for name, table in content["evaluations"])
+        content["evaluations"] = tuple(evaluations)
+        content["curriculum"] = tuple(
+            Stage(name, episodes, build({"scenario": table}).scenario)
+            for name, episodes, table in content["curriculum"]
         )
+        return Trial(**content)

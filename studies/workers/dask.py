@@ -21,7 +21,7 @@ from distributed.comm.registry import get_backend
 
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .fork_server import Answer, call_for
+from .fork_server import Answer, call_for, outcome_of
 from .runner import ONE_THREAD, Outcome, RunTrial, Workers, starting_processes, versions
 
 CONNECT_TIMEOUT_S = 10.0
@@ -31,10 +31,6 @@ WORKER_TIMEOUT_S = 60.0
 """Timeout for the first worker, or for a new one when all have gone [s]."""
 
 
-class IncompatibleWorkerError(Exception):
-    """A worker might give other bits, in one line."""
-
-
 def call_if_compatible(
     expected: dict[str, str], function: Callable[..., Outcome | Answer], *arguments: object
 ) -> Outcome | Answer:
@@ -42,25 +38,25 @@ def call_if_compatible(
 
     Raises
     ------
-    IncompatibleWorkerError
-        If its `versions` differ, or it uses several threads.
+    SpecError
+        If its `versions` differ, or it uses several threads: it might give other bits.
     """
     worker = get_worker()
     here = versions() | {name: os.environ.get(name, "not set") for name in ONE_THREAD}
     for name, wanted in (expected | ONE_THREAD).items():
         if here[name] != wanted:
-            raise IncompatibleWorkerError(
+            raise SpecError(
                 f"the worker {worker.address} has {name} {here[name]}, must be {wanted}"
             )
     if worker.state.nthreads > 1:
-        raise IncompatibleWorkerError(
+        raise SpecError(
             f"the worker {worker.address} has {worker.state.nthreads} threads, must be 1: start "
             f"dask worker with --nworkers {worker.state.nthreads} --nthreads 1"
         )
     return function(*arguments)
 
 
-class DaskWorkers(Workers[Future]):
+class DaskWorkers(Workers):
     """Workers of a Dask cluster; see `Workers`. Use `DaskWorkers.local` or `DaskWorkers.at`.
 
     Parameters
@@ -152,13 +148,13 @@ class DaskWorkers(Workers[Future]):
         except KilledWorker:
             self._empty_since = None
             return Outcome(trial, f"killed, in {self._name}", 0.0, lost=True)
-        except IncompatibleWorkerError as error:
+        except SpecError as error:
             raise SpecError(f"{self._name}: {error}") from None
         except (CancelledError, CommClosedError):
             raise self._gone() from None
         except ImportError as error:
             raise SpecError(f"{self._name}: a worker cannot start: {error}") from None
-        return result if isinstance(result, Outcome) else result.outcome(trial)
+        return outcome_of(result, trial)
 
     def stop(self, futures: Sequence[Future]) -> None:
         """Stop trials that are running, see `Workers.stop`."""

@@ -22,7 +22,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from multiprocessing.connection import Connection, Pipe, wait
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,29 +37,23 @@ POLL_S = 0.2
 """Polling interval for processes that died without an answer [s]."""
 
 
-class Answer(NamedTuple):
-    """Answer of the process of a trial."""
-
-    content: bytes
-    """Pickled error, seconds and result; empty if the process died before."""
-    death: str = ""
-    """Cause of death as text; empty if the process answered."""
-
-    def outcome(self, trial: Trial) -> Outcome:
-        """Return the outcome of the trial."""
-        if self.death:
-            return Outcome(trial, self.death, 0.0, lost=True)
-        error, seconds, result = pickle.loads(self.content)
-        return Outcome(trial, error, seconds, result)
+Answer = tuple[bytes, str]
+"""Pickled error, seconds and result of a trial, and the cause of death of its process; one of the
+two is empty."""
+TrialMessage = tuple[bytes, LoadedCode]
+"""Message of a trial's process to the fork server: pickled error, seconds and result, and what the
+process had loaded at the end."""
 
 
-class TrialMessage(NamedTuple):
-    """Message of a trial's process to the fork server."""
-
-    outcome: bytes
-    """Pickled error, seconds and result of the trial."""
-    loaded: LoadedCode
-    """Modules and kernels that the process had loaded at the end."""
+def outcome_of(answer: Outcome | Answer, trial: Trial) -> Outcome:
+    """Return the outcome of a trial from the answer of a worker."""
+    if isinstance(answer, Outcome):
+        return answer
+    content, death = answer
+    if death:
+        return Outcome(trial, death, 0.0, lost=True)
+    error, seconds, result = pickle.loads(content)
+    return Outcome(trial, error, seconds, result)
 
 
 def call_for(
@@ -88,11 +82,11 @@ def run_in_own_process(task: bytes, seed: int) -> Answer:
     _, server = _start_server(os.getpid())
     try:
         server.send((task, seed))
-        content, death = server.recv()
+        answer: Answer = server.recv()
     except (EOFError, OSError):
         _start_server.cache_clear()
-        return Answer(b"", "the process that starts trials has died")
-    return Answer(content, death)
+        return b"", "the process that starts trials has died"
+    return answer
 
 
 @cache
@@ -112,17 +106,18 @@ def serve(descriptor: int) -> None:
     worker = Connection(descriptor)
     restore_child_signal()
     importlib.import_module("nested_agents.studies.trials.session")
-    known = LoadedCode((), ())
+    known: LoadedCode = (), ()
     while True:
         try:
             task, seed = worker.recv()
         except (EOFError, OSError):
             return
         message, death = _fork(worker, task, seed)
-        worker.send((b"" if message is None else message.outcome, death))
-        if message is not None and message.loaded != known:
-            preload(message.loaded, known)
-            known = message.loaded
+        outcome, loaded = message or (b"", known)
+        worker.send((outcome, death))
+        if loaded != known:
+            preload(loaded, known)
+            known = loaded
             gc.collect()
             gc.freeze()  # children share memory that is not changed
 
@@ -201,4 +196,4 @@ def _run(task: bytes, seed: int) -> TrialMessage:
         outcome = pickle.dumps((error, seconds, result))
     except BaseException:  # its settings or its result cannot be pickled
         outcome = pickle.dumps((storable(traceback.format_exc()), 0.0, None))
-    return TrialMessage(outcome, loaded_code())
+    return outcome, loaded_code()

@@ -10,7 +10,6 @@ import pickle
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import NamedTuple
 
 from ...core.numerics.compiler import Kernel
 
@@ -37,30 +36,16 @@ LIBRARIES = frozenset(
 """Modules that may be preloaded, because their import has no side effects."""
 
 
-class LoadedKernel(NamedTuple):
-    """A kernel that has been loaded for arguments of some types."""
-
-    module: str
-    """Module of the kernel."""
-    name: str
-    """Name in the module."""
-    types: bytes
-    """Pickled types of its arguments."""
-
-
-class LoadedCode(NamedTuple):
-    """Modules and kernels that a process has loaded."""
-
-    modules: tuple[str, ...]
-    """Names of modules of `LIBRARIES`, in the order in which they were imported."""
-    kernels: tuple[LoadedKernel, ...]
-    """Kernels of this package."""
+LoadedKernel = tuple[str, str, bytes]
+"""Module of a kernel of this package, its name there, and pickled types of its arguments."""
+LoadedCode = tuple[tuple[str, ...], tuple[LoadedKernel, ...]]
+"""Names of modules of `LIBRARIES`, in the order of their import, and kernels."""
 
 
 def loaded_code() -> LoadedCode:
     """Return the modules and kernels that this process has loaded."""
     modules = (name for name in sys.modules if name.partition(".")[0] in LIBRARIES)
-    return LoadedCode(tuple(modules), tuple(_loaded_kernels()))
+    return tuple(modules), tuple(_loaded_kernels())
 
 
 def _loaded_kernels() -> Iterator[LoadedKernel]:
@@ -70,16 +55,16 @@ def _loaded_kernels() -> Iterator[LoadedKernel]:
         for name, kernel in list(vars(content).items()):
             if isinstance(kernel, Kernel) and kernel.py_func.__module__ == module:
                 for types in kernel.signatures:
-                    yield LoadedKernel(module, name, pickle.dumps(types))
+                    yield module, name, pickle.dumps(types)
 
 
 def preload(goal: LoadedCode, known: LoadedCode) -> None:
     """Load the modules and kernels of `goal` that are not `known`. Errors are ignored."""
-    for name in goal.modules:
+    for name in goal[0]:
         if name not in sys.modules:
             with suppress(Exception):
                 importlib.import_module(name)
-    for kernel in {*goal.kernels} - {*known.kernels}:
+    for module, name, types in {*goal[1]} - {*known[1]}:
         with suppress(Exception):
-            own = vars(importlib.import_module(kernel.module))[kernel.name]
-            own.compiled.compile(pickle.loads(kernel.types))
+            own = vars(importlib.import_module(module))[name]
+            own.compiled.compile(pickle.loads(types))

@@ -19,7 +19,7 @@ from itertools import chain, islice
 from pathlib import Path
 from platform import python_version
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Generic, Literal, NamedTuple, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 from ..store.store import Store
 from ..store.writer import Running
@@ -190,7 +190,7 @@ class Observer:
 
 
 def run_trials(
-    trials: Sequence[Trial], store: Store, run_trial: RunTrial, workers: Workers[F]
+    trials: Sequence[Trial], store: Store, run_trial: RunTrial, workers: Workers
 ) -> Generator[Outcome]:
     """Run trials in parallel; store, then yield each as it finishes.
 
@@ -220,7 +220,7 @@ def run_trials(
                     yield outcome
 
 
-def _alone(trial: Trial, run_trial: RunTrial, workers: Workers[F], running: Running) -> Outcome:
+def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running) -> Outcome:
     for _ in range(ATTEMPTS):
         arrivals = workers.arrivals([trial], run_trial, running.start, running.end)
         with closing(arrivals) as arriving:
@@ -265,17 +265,11 @@ POLL_S = 1.0
 """Polling interval for new workers [s]."""
 
 
-class Submitted(Protocol):
-    """Future of a backend."""
-
-    def add_done_callback(self, fn: Callable[[Self], object], /) -> object:
-        """Call a function with the future when it is done."""
+Submitted: TypeAlias = Any
+"""Future of a backend, which has `add_done_callback`."""
 
 
-F = TypeVar("F", bound=Submitted)
-
-
-class Workers(ABC, Generic[F]):
+class Workers(ABC):
     """Processes that run trials; base class of the backends."""
 
     @property
@@ -284,15 +278,15 @@ class Workers(ABC, Generic[F]):
         """Number of trials that run at a time."""
 
     @abstractmethod
-    def submit(self, run_trial: RunTrial, trial: Trial) -> F:
+    def submit(self, run_trial: RunTrial, trial: Trial) -> Submitted:
         """Submit a trial to a free worker and return its future."""
 
     @abstractmethod
-    def fetch(self, future: F, trial: Trial) -> Outcome | None:
+    def fetch(self, future: Submitted, trial: Trial) -> Outcome | None:
         """Return the outcome of a trial after its future is done; None if it runs again."""
 
     @abstractmethod
-    def stop(self, futures: Sequence[F]) -> None:
+    def stop(self, futures: Sequence[Submitted]) -> None:
         """Stop the running trials."""
 
     def arrivals(
@@ -317,8 +311,8 @@ class Workers(ABC, Generic[F]):
         """
         waiting = iter(trials)
         left = len(trials)
-        running: dict[F, Trial] = {}
-        finished: SimpleQueue[F] = SimpleQueue()
+        running: dict[Submitted, Trial] = {}
+        finished: SimpleQueue[Submitted] = SimpleQueue()
 
         def submit_waiting() -> None:
             for trial in islice(waiting, max(self.processes - len(running), 0)):

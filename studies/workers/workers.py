@@ -24,7 +24,7 @@ from ...core.plugins.words import closest
 from ...core.shell import command_line
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .fork_server import Answer, call_for, describe_exit
+from .fork_server import Answer, call_for, describe_exit, outcome_of
 from .runner import (
     ONE_THREAD,
     Backend,
@@ -71,7 +71,7 @@ def _check_semaphores() -> None:
 @contextmanager
 def start_workers(
     backend: Backend, jobs: int | None, address: str | None, trials: int
-) -> Iterator[Workers[Any]]:
+) -> Iterator[Workers]:
     """Start workers, which end with the context, or connect to a cluster.
 
     Parameters
@@ -146,7 +146,7 @@ def _describe(death: TerminatedWorkerError) -> str:
     return ", ".join(describe_exit(int(code)) for code in codes) or "unknown exit code"
 
 
-class LokyWorkers(Workers[Future[Outcome | Answer]]):
+class LokyWorkers(Workers):
     """Processes of this machine, which end with their parent; see `Workers`.
 
     Even a single job has its own process, so a crash in native code costs one trial, and linear
@@ -184,10 +184,9 @@ class LokyWorkers(Workers[Future[Outcome | Answer]]):
     def fetch(self, future: Future[Outcome | Answer], trial: Trial) -> Outcome:
         """Return the outcome of a trial, see `Workers.fetch`."""
         try:
-            result = future.result()
+            return outcome_of(future.result(), trial)
         except TerminatedWorkerError as death:
             return Outcome(trial, _describe(death), 0.0, lost=True)
-        return result if isinstance(result, Outcome) else result.outcome(trial)
 
     def stop(self, futures: Sequence[Future[Outcome | Answer]]) -> None:
         """Stop trials that are running, see `Workers.stop`."""

@@ -6,11 +6,11 @@ from types import ModuleType
 
 import pytest
 
-from nested_agents.studies.api.running import run_study
+from nested_agents.studies.api.running import run
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.results.results import NUMBERS
 from nested_agents.studies.spec.keys import tables
-from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import Store
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 SPEC = {
@@ -46,7 +46,8 @@ def test_every_key_and_command_is_there(pages: dict[str, str]) -> None:
 
 
 def test_the_columns_are_those_of_a_study(reference: ModuleType, tmp_path: Path) -> None:
-    with run_study(Spec.of(SPEC), tmp_path / "study", jobs=1) as store:
+    run(SPEC, tmp_path / "study", jobs=1, progress=False)
+    with Store.open(tmp_path / "study") as store:
         episodes, trials = store.episodes()[0], store.trials()[0]
         measures = [measure.name for measure in store.measures()]
     parts = {"*swept keys*": ["scenario.carts"], "*measures*": measures, "*numbers*": []}

@@ -37,7 +37,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import FloatArray, IntArray, njit
-from ....core.plugins.settings import tuples
+from ....core.plugins.models import tuples
 from ....core.plugins.words import closest
 from .settings import RobotSettings
 

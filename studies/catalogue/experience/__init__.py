@@ -9,7 +9,7 @@ at the end, paired by seed, by greedy actions.
 
 from collections.abc import Mapping, Sequence
 from itertools import count
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -95,19 +95,9 @@ def evaluated_after(results: Results, condition: str, suffix: str = "") -> dict[
     return dict(sorted(phases.items()))
 
 
-class ReturnCourse(NamedTuple):
-    """Evaluations of one condition in the course of its training."""
-
-    condition: str
-    """Label of the condition."""
-    place: int
-    """Number of the condition."""
-    is_sampled: bool
-    """Whether actions are sampled from the policy; otherwise they are greedy."""
-    decisions: Array
-    """``(k,)`` decisions experienced until each evaluation."""
-    values: Estimate
-    """``(k,)`` results of the evaluations."""
+ReturnCourse = tuple[str, int, bool, Array, Estimate]
+"""Label and number of a condition; whether actions are sampled from the policy or greedy;
+``(k,)`` decisions experienced until each evaluation; and ``(k,)`` results of the evaluations."""
 
 
 def analyse(results: Results) -> Analysis:
@@ -118,7 +108,7 @@ def analyse(results: Results) -> Analysis:
     measure = _measure_of(results, conditions)
     title = f"evaluation {measure.heading}"
     table = []
-    courses = []
+    courses: list[ReturnCourse] = []
     for index, condition in enumerate(conditions):
         for is_sampled in (False, True) if results.has(condition, SAMPLED) else (False,):
             values = _evaluations(results, condition, measure, BY_SAMPLING * is_sampled)
@@ -130,7 +120,7 @@ def analyse(results: Results) -> Analysis:
             table.append(Summary(label, len(results.seeds(condition)), estimates))
             stacked = stack_estimates([*values.values()])
             decisions = np.array([*values], float)
-            courses.append(ReturnCourse(condition, index, is_sampled, decisions, stacked))
+            courses.append((condition, index, is_sampled, decisions, stacked))
     means = [results.means(condition, "evaluation", measure.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
     compared = differences({title: pairs[1:]}, measure)
@@ -139,7 +129,7 @@ def analyse(results: Results) -> Analysis:
         "after N: when evaluated after N joint decisions of training, of all environments.",
         *verdicts(heads, measure),
     ]
-    if any(course.is_sampled for course in courses):
+    if any(is_sampled for _, _, is_sampled, *_ in courses):
         notes.insert(1, "Sampled actions are drawn from the policy; others are greedy.")
     return Analysis(tuple(table), tuple(notes), courses, compared)
 
@@ -185,9 +175,10 @@ def draw(analysis: Analysis) -> Figures:
     courses: Sequence[ReturnCourse] = analysis.cases
     hollow: dict[str, Any] = {"marker": "o", "markersize": 5, "markerfacecolor": "white"}
     filled: dict[str, Any] = {"marker": "o", "markersize": 3.5}
-    for course in courses:
-        look = hollow if course.is_sampled else filled
-        f.draw_curve(axes, course.decisions, course.values, course.place, **look)
+    labels = []
+    for label, place, is_sampled, decisions, values in courses:
+        labels += [] if is_sampled else [label]
+        f.draw_curve(axes, decisions, values, place, **(hollow if is_sampled else filled))
     f.log_axis(axes, "x")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     axes.set_xlabel("joint decisions of training")
@@ -196,7 +187,6 @@ def draw(analysis: Analysis) -> Figures:
     axes.grid(axis="y", alpha=0.25)
     if title == EVALUATED:
         f.as_rates(axes)
-    labels = [course.condition for course in courses if not course.is_sampled]
     handles = [f.handle(label, **f.look(i), lw=1.6, **filled) for i, label in enumerate(labels)]
     if len(labels) < len(courses):
         handles.append(f.handle("sampled actions", color="#444444", lw=0, **hollow))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,15 +19,9 @@ SHORT = "{:.2g}".format
 """Format of the numbers in tables: two significant digits."""
 
 
-class ScenarioCase(NamedTuple):
-    """A scenario and the episodes in which it is checked."""
-
-    label: str
-    """Name in the printed lines: the condition, or the function or class."""
-    build: Callable[[], object]
-    """Build a new instance of the scenario."""
-    episodes: list[int]
-    """Indices of the episodes that are played: the first, and those in which failures begin."""
+ScenarioCase = tuple[str, Callable[[], object], list[int]]
+"""Label of a scenario, a function that builds a new instance, and the episodes that are played: the
+first, and those in which failures begin."""
 
 
 @click.command()
@@ -59,27 +53,23 @@ def check(source: str, steps: int, trust: bool, changes: tuple[str, ...]) -> int
         trust_beside(Path(source))
     cases = _cases_of_spec(source, changes) if is_spec else [_case_of_file(source)]
     faults = 0
-    for case in cases:
+    for label, build, episodes in cases:
         try:
-            report = check_scenario(case.build, steps=steps, episodes=case.episodes)
+            report = check_scenario(build, steps=steps, episodes=episodes)
         except ScenarioError as error:
             faults += 1
-            print_text(f"FAULT   {case.label}: {error}")
+            print_text(f"FAULT   {label}: {error}")
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
             for kind, text in report.remarks():
-                label = f"{case.label}: " if kind == "passed" else ""
-                print_wrapped(f"{label}{text}", f"{kind}  ", 8)
+                head = f"{label}: " if kind == "passed" else ""
+                print_wrapped(f"{head}{text}", f"{kind}  ", 8)
             frame = DataFrame(report.variables)
-            _print_frame(frame.to_string(index=False, na_rep="", float_format=SHORT))
+            print_text("", frame.to_string(index=False, na_rep="", float_format=SHORT), "")
     if is_spec and not faults:
         check_conditions(Spec.load(Path(source), changes))
     return 1 if faults else 0
-
-
-def _print_frame(text: str) -> None:
-    print_text("", text, "")
 
 
 def _case_of_file(source: str) -> ScenarioCase:
@@ -91,7 +81,7 @@ def _case_of_file(source: str) -> ScenarioCase:
     except (Exception, SystemExit) as error:
         message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
         raise SpecError(f"{source}, called as a scenario is, {message}") from None
-    return ScenarioCase(source.rpartition(":")[2], build, [0, 1])
+    return source.rpartition(":")[2], build, [0, 1]
 
 
 def _factory_of(source: str) -> Callable[[], object]:
@@ -123,4 +113,4 @@ def _cases_of_spec(source: str, changes: tuple[str, ...]) -> Iterator[ScenarioCa
         if settings not in checked:
             checked.append(settings)
             episodes = sorted({0, *(begin for begin, _ in settings.failure_spans)})
-            yield ScenarioCase(condition.label, settings.build, episodes)
+            yield condition.label, settings.build, episodes

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -17,7 +17,6 @@ from .. import options
 from ..display import print_data, print_text, print_wrapped
 
 if TYPE_CHECKING:
-    from ....core.agents.joint import Granularity
     from ....topologies import view
     from ...cost.formats import Form as CostForm
 
@@ -34,7 +33,7 @@ def presets(name: str | None) -> int:
     if name is None:
         left = max(map(len, PRESETS)) + 2
         for key, preset in PRESETS.items():
-            print_wrapped(preset.summary, f"{key:<{left}}", left)
+            print_wrapped(preset["summary"], f"{key:<{left}}", left)
         return 0
     from ...spec.resolution import resolve
     from ...spec.tables import dumps
@@ -105,15 +104,6 @@ RANGE = re.compile(r"(\d{1,15})(?::(\d{1,15})(?::(\*?)(\d{1,15}))?)?", re.ASCII)
 """First and last number, and what is added or multiplied from one number to the next."""
 
 
-class QuantityOptions(TypedDict):
-    """Quantities of the formulas as they are typed, see `nested_agents.studies.cost.table`."""
-
-    memberships: tuple[str, ...]
-    rules: tuple[str, ...]
-    actions: tuple[str, ...]
-    iterations: int
-
-
 def several(name: str, default: str, text: str) -> options.Decorator:
     """Return an option that takes several numbers, lists of numbers and ranges."""
     return click.option(
@@ -155,54 +145,22 @@ def several(name: str, default: str, text: str) -> options.Decorator:
     "learner.decision.budget.",
 )
 @options.formats("table", "json", "csv", "latex")
-@options.plot
-def cost(
-    agents: tuple[str, ...],
-    topology: tuple[str, ...],
-    measured: bool,
-    network: bool,
-    budget: int | None,
-    form: CostForm,
-    plot: Path | None,
-    **typed: Unpack[QuantityOptions],
-) -> int:
+def cost(topology: tuple[str, ...], form: CostForm, **quantities: Any) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if requested, measured.
 
     Several numbers of agents, rules and actions give a row for each combination.
     """
-    from ...cost import table as costs
     from ...cost.formats import format_rows
+    from ...cost.table import cost_table
     from ...presentation.progress import say
 
     with refused():
-        quantities: costs.Quantities = {
-            "actions": numbers("actions", typed["actions"]),
-            "iterations": typed["iterations"],
-        }
-        if typed["memberships"]:
-            quantities["memberships"] = numbers("memberships", typed["memberships"])
-        if typed["rules"]:
-            quantities["rules"] = numbers("rules", typed["rules"])
-        sizes = numbers("agents", agents)
-        if measured:
-            if plot is not None:  # a figure that cannot be read is refused before anything is timed
-                from ...cost.figure import check
-
-                check(costs.cost_table(topology, sizes, **quantities).rows, plot)
+        for name in ("agents", "memberships", "rules", "actions"):
+            texts = quantities[name]
+            quantities[name] = numbers(name, texts) if texts else None
+        if quantities["measured"]:
             say("Measuring. Code is compiled first; steps of over about a second are left out.")
-        rows = costs.cost_table(
-            topology,
-            sizes,
-            budget=budget,
-            measured=measured,
-            network=network,
-            **quantities,
-        ).rows
-        if plot is not None:
-            from ...cost.figure import draw
-
-            draw(rows, plot)
-            say(f"figure  {plot}")
+        rows = cost_table(topology, **quantities).rows
     print_data(f"{format_rows(rows, form)}\n")
     return 0
 
@@ -250,6 +208,7 @@ def profile(spec: Path, seconds: float, form: str, changes: tuple[str, ...]) -> 
     Each condition of SPEC.toml acts and learns for a while; nothing is kept. The table has the
     processor time by part, and compares the joint actions tried with the formulas.
     """
+    from ...cost.profile import lines
     from ...cost.profile import profile as profile_of
     from ...presentation.progress import say
     from ...presentation.tables import in_csv
@@ -258,7 +217,10 @@ def profile(spec: Path, seconds: float, form: str, changes: tuple[str, ...]) -> 
     say("Compiling code, then timing the decisions of every condition.")
     with refused():
         timed = profile_of(Spec.load(spec, changes), seconds)
-    print_data(in_csv(timed.frame) if form == "csv" else f"{timed}\n")
+    if form == "csv":
+        print_data(in_csv(timed))
+    else:
+        print_text(*lines(timed))
     return 0
 
 
@@ -278,15 +240,6 @@ def list_all() -> int:
 
     print_text(list_kinds())
     return 0
-
-
-class TeamOptions(TypedDict):
-    """Agents of the hierarchy."""
-
-    agents: int | None
-    robots: int | None
-    per: Granularity
-    actions: int
 
 
 @topology.command()
@@ -325,7 +278,7 @@ def show(
     scenario: str | None,
     form: view.Form,
     plot: Path | None,
-    **team: Unpack[TeamOptions],
+    **team: Any,
 ) -> int:
     """Show a topology: edges, order of decision, communication, lookahead, cost.
 

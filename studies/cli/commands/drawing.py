@@ -60,9 +60,7 @@ def _distinct(spec: Spec) -> Iterator[tuple[str, ScenarioSettings]]:
     """Yield the distinct scenarios of conditions and evaluations, each with its first label."""
     seen = set[str]()
     for condition in spec.conditions():
-        places = [(condition.label, condition.settings)]
-        places += [(f"{condition.label}, {name}", there) for name, there in condition.evaluations]
-        for label, settings in places:
+        for label, settings in condition.labeled.items():
             content = settings.scenario.model_dump_json()
             if content not in seen:
                 seen.add(content)

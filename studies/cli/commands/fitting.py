@@ -1,6 +1,7 @@
 """The command that fits laws of growth to the results of a study."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,11 +14,7 @@ from ..loading import read_results, say_remarks
 @options.sources
 @options.measure
 @options.phase
-@click.option(
-    "--size",
-    metavar="KEY",
-    help="The swept key that is the size; by default the number of robots or agents.",
-)
+@options.size
 @click.option(
     "--criterion",
     type=float,
@@ -39,16 +36,12 @@ from ..loading import read_results, say_remarks
 @options.trust
 def fit(
     sources: tuple[Path, ...],
-    measure: str | None,
-    phase: str | None,
-    size: str | None,
-    criterion: float | None,
-    predict: tuple[int, ...],
     columns: tuple[str, ...],
     plot: Path | None,
     where: str | None,
     form: Form,
     trust: bool,
+    **choices: Any,
 ) -> int:
     """Fit how results grow with the size of teams: exponents, floors, break points, predictions.
 
@@ -62,9 +55,7 @@ def fit(
 
     loaded = read_results(sources, where=where, trust=trust, columns=columns)
     say_remarks(loaded)
-    growth = scaling_law(
-        loaded, measure, phase=phase, size=size, criterion=criterion, predict=predict
-    )
+    growth = scaling_law(loaded, **choices)
     if plot is not None:
         save_plot(growth.figure, plot)
     if form != "table":

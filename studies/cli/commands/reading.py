@@ -2,12 +2,12 @@
 
 import io
 from pathlib import Path
-from typing import Literal, TypedDict, Unpack
+from typing import Any, Literal
 
 import click
 
 from ....core.shell import command_line
-from ...api.status import describe, failures, progress
+from ...api.status import failures, progress
 from ...errors import SpecError
 from ...presentation.progress import say
 from ...spec.outline import StudyOutline, sources_of
@@ -42,7 +42,7 @@ def status(directory: Path) -> int:
     DIR is the folder of the study. Reading it does not disturb a run.
     """
     with Store.open(directory) as store:
-        print_lines(describe(store, progress(store)))
+        print_lines(progress(store).lines())
         failed = store.failed()
     for text in failures(failed):
         print_text(f"\n{text}")
@@ -84,15 +84,6 @@ def table(
     return 0
 
 
-class Compared(TypedDict):
-    """Options of `StudyResults.compare`."""
-
-    by: str | None
-    measure: str | None
-    phase: str | None
-    reference: str | None
-
-
 @click.command()
 @options.sources
 @click.option(
@@ -127,7 +118,7 @@ def compare(
     where: str | None,
     form: Form,
     trust: bool,
-    **compared: Unpack[Compared],
+    **compared: Any,
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
@@ -295,9 +286,7 @@ def report(directory: Path, out: Path | None, trust: bool) -> int:
 @click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
 @click.option("--full", is_flag=True, help="Print all rules and tables, not only the summary.")
 @options.trust
-def explain(
-    directory: Path, condition: str | None, seed: int | None, full: bool, trust: bool
-) -> int:
+def explain(directory: Path, full: bool, trust: bool, **trial: Any) -> int:
     """Explain a trained team: its rules in words and its self-model.
 
     DIR is the folder of the study. The text with all rules and the figures are written to its
@@ -310,7 +299,7 @@ def explain(
     if trust:
         trust_files(directory)
     with open_study(directory):
-        explained = explain_team(directory, condition, seed)
+        explained = explain_team(directory, **trial)
     explained.folder.mkdir(parents=True, exist_ok=True)
     written = explained.folder / "explanation.txt"
     durable.write(written, explained.text.encode())

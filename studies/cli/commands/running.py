@@ -3,19 +3,13 @@
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import TypedDict, Unpack
+from typing import Any
 
 import click
 
 from ....core.shell import command_line
 from .. import options
 from ..display import print_data, print_table, print_text, show_results
-
-
-class Rerun(options.RunOptions):
-    """Options of ``run`` and ``retry``."""
-
-    checkpoint: float
 
 
 @click.command()
@@ -81,7 +75,7 @@ def run(
     trust: bool,
     figures: tuple[str, ...],
     changes: tuple[str, ...],
-    **running: Unpack[Rerun],
+    **running: Any,
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
@@ -90,14 +84,11 @@ def run(
     from ...api.running import run
     from ...errors import SpecError
     from ...presentation.progress import Terminal
-    from ...spec.spec import Spec
     from ...store.database import DATABASE, SPEC_FILE
-    from ..loading import trust_beside
+    from ..loading import load_spec
 
-    if trust:
-        trust_beside(out, spec)
     try:
-        changed = Spec.load(spec, changes, study=out)
+        changed = load_spec(spec, changes, trust=trust, out=out)
     except SpecError as error:
         own = os.path.realpath(out / SPEC_FILE)
         if not (out / DATABASE).exists() or os.path.realpath(spec) != own:
@@ -107,19 +98,6 @@ def run(
             "database"
         ) from None
     return show_results(run(changed, out, observer=Terminal(), **running), figures)
-
-
-class Budget(TypedDict):
-    """The options of how much is tried by ``tune``."""
-
-    trials: int
-    seeds: int
-    first_seed: int
-    draw: int
-
-
-class TuneOptions(Budget, options.RunOptions):
-    """All options of ``tune`` but where to and what to change."""
 
 
 @click.command()
@@ -135,35 +113,21 @@ class TuneOptions(Budget, options.RunOptions):
 @options.running
 @options.trust
 @options.changes
-def tune(
-    spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice: Unpack[TuneOptions]
-) -> int:
+def tune(spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice: Any) -> int:
     """Search for better settings of a spec on separate seeds; the same command resumes it.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
     configurations are tried on two seeds, the better half on four, and so on.
     """
     from ...api import tuning
-    from ...spec.spec import Spec
-    from ..loading import trust_beside
+    from ..loading import load_spec
 
-    if trust:
-        trust_beside(out, spec)
-    tuned = tuning.tune(Spec.load(spec, changes, study=out), out, **choice)
+    tuned = tuning.tune(load_spec(spec, changes, trust=trust, out=out), out, **choice)
     print_table(tuned.study.table(tuned.columns))
     print_text("", *tuned.lines, "")
     print_text(f"spec    {out / tuning.BEST_FILE}")
     print_text(f"table   {out / tuning.TABLE_FILE}")
     return 0
-
-
-class Supposed(TypedDict):
-    """Assumptions of a plan."""
-
-    jobs: int | None
-    deviation: float | None
-    smallest: float | None
-    timed: bool
 
 
 @click.command()
@@ -184,18 +148,15 @@ class Supposed(TypedDict):
 @click.option("--timed/--no-timed", default=True, help="Run pilot episodes of every condition.")
 @options.trust
 @options.changes
-def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[Supposed]) -> int:
+def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Any) -> int:
     """Estimate the time of a study, and the differences that it can detect.
 
     SPEC.toml is the spec of the study. Every condition runs some pilot episodes; nothing is kept.
     """
     from ...api import planning
-    from ...spec.spec import Spec
-    from ..loading import trust_beside
+    from ..loading import load_spec
 
-    if trust:
-        trust_beside(spec)
-    print_text(planning.plan(Spec.load(spec, changes), **supposed))
+    print_text(planning.plan(load_spec(spec, changes, trust=trust), **supposed))
     return 0
 
 
@@ -204,7 +165,7 @@ def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Unpack[S
 @options.running
 @options.checkpoint
 @options.trust
-def retry(directory: Path, trust: bool, **running: Unpack[Rerun]) -> int:
+def retry(directory: Path, trust: bool, **running: Any) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
     DIR is the folder of the study.

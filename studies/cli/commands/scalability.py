@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -22,11 +22,7 @@ READING = {"sources", "columns", "better", "where", "trust"}
 @click.command()
 @options.sources
 @options.measure
-@click.option(
-    "--size",
-    metavar="KEY",
-    help="The swept key that is the size; by default the number of robots or agents.",
-)
+@options.size
 @click.option(
     "--scaling",
     type=click.Choice(["strong", "weak"]),
@@ -78,7 +74,7 @@ def scalability(
     where: str | None,
     form: Form,
     trust: bool,
-    **choices: str | float | None,
+    **choices: Any,
 ) -> int:
     """Show which hierarchy scales, up to how many agents, and at which cost.
 
@@ -100,9 +96,9 @@ def scalability(
     if predict:
         if out is None:
             raise click.UsageError("--predict: needs --out FILE.json")
-        print_text(*loaded.predict_sizes(predict, out, measure, size=choices["size"]))  # type: ignore[arg-type]
+        print_text(*loaded.predict_sizes(predict, out, measure, size=choices["size"]))
         return 0
-    report = loaded.scalability(measure, **choices)  # type: ignore[arg-type]
+    report = loaded.scalability(measure, **choices)
     if plot is not None:
         save_plot(report.figure, plot)
     if form == "json":

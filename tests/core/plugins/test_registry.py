@@ -10,7 +10,8 @@ from typing import Annotated
 import pytest
 
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
-from nested_agents.core.plugins.registry import Plugged, Registry, SettingsRegistry
+from nested_agents.core.plugins.models import Plugged
+from nested_agents.core.plugins.registry import Registry, SettingsRegistry
 from nested_agents.core.plugins.settings import PartSettings, Settings, SettingsError
 from nested_agents.core.plugins.sources import Sources
 

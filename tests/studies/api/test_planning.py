@@ -41,9 +41,9 @@ def test_more_seeds_find_smaller_differences() -> None:
 
 
 def test_pilot_episodes_give_the_cost_of_a_trial() -> None:
-    cost = planning.pilot(trials_of(SPEC)[0])
-    assert 0.0 < cost.seconds < 60.0
-    assert cost.startup > 0.0
+    seconds, startup = planning.pilot(trials_of(SPEC)[0])
+    assert 0.0 < seconds < 60.0
+    assert startup > 0.0
 
 
 def test_large_teams_run_the_first_steps_only(monkeypatch) -> None:
@@ -86,10 +86,10 @@ EXPERIENCE = {"study": "experience", "seeds": 3, "steps": 10, "evaluation": 1}
 )
 def test_budgets_of_decisions_are_extrapolated(own):
     tables = [{**EXPERIENCE, **own}, {**EXPERIENCE, **own, "decisions": 10 * own["decisions"]}]
-    less, more = (planning.pilot(trials_of(na.Spec.of(table))[0]) for table in tables)
-    assert less.seconds > 0.0
+    less, more = (planning.pilot(trials_of(na.Spec.of(table))[0])[0] for table in tables)
+    assert less > 0.0
     if own.get("preset") != "random":
-        assert more.seconds > less.seconds
+        assert more > less
 
 
 def test_a_plan_counts_decisions():

@@ -150,7 +150,7 @@ def test_what_holds_no_study_is_refused_in_one_line(tmp_path) -> None:
 
 def test_the_status_and_a_team_in_words(study, places) -> None:
     assert str(study.status).splitlines()[1] == "done     6 of 6 trials"
-    assert study.status.progress.left == 0
+    assert study.status.left == 0
     with pytest.raises(na.SpecError, match="not the results of one study"):
         _ = na.load(*places).status
 

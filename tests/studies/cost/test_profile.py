@@ -9,7 +9,7 @@ import pytest
 import nested_agents as na
 from nested_agents.core.agents.loop import control_loop
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.cost.profile import DECIDING, PARTS, Profile, ProfileTable, Sampler
+from nested_agents.studies.cost.profile import PARTS, lines, sample_parts
 
 if not hasattr(signal, "setitimer"):
     pytest.skip("takes a timer of the system", allow_module_level=True)
@@ -41,19 +41,16 @@ def test_what_is_tried_stands_beside_the_formulas(tmp_path: Path, capsys) -> Non
     )
     assert chain[2] != "exact"
     assert chain[4] == "5,460"
-    assert "not as by the formula with 6 agents." in " ".join(out.split())
     assert [path.name for path in tmp_path.iterdir()] == ["spec.toml"]
 
 
 def test_parts_are_of_what_runs() -> None:
     table = na.profile({"steps": 20, "scenario": {"kind": "line-up"}}, seconds=0.2)
-    (row,) = table.rows
-    assert set(row.seconds) == set(PARTS)
-    assert min(row.seconds.values()) >= 0.0
-    assert row.deciding > 0.0
-    assert row.deciding == pytest.approx(sum(row.seconds[part] for part in DECIDING))
-    assert row.seconds["sense"] == 0.0  # line-up reports none
-    assert list(table.frame["tried"]) == [20.0]
+    (row,) = table.to_dict("records")
+    assert min(row[part] for part in PARTS) >= 0.0
+    assert row["predict"] + row["value"] + row["search"] > 0.0
+    assert row["sense"] == 0.0  # line-up reports none
+    assert row["tried"] == 20.0
 
 
 def test_a_team_that_is_timed_learns_the_same() -> None:
@@ -67,47 +64,28 @@ def test_a_team_that_is_timed_learns_the_same() -> None:
 
     plain = trained()
     before = signal.getsignal(signal.SIGALRM)
-    with Sampler() as sampler:
+    with sample_parts() as seconds:
         timed = trained()
     assert np.array_equal(plain, timed)
-    assert sum(sampler.seconds.values()) > 0.0
+    assert sum(seconds.values()) > 0.0
     assert signal.getsignal(signal.SIGALRM) is before
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
-def profile_of(agents: int, tried: float, formula: int, seconds: float) -> Profile:
-    parts = dict.fromkeys(PARTS, 0.0) | {"predict": 0.75 * seconds, "search": 0.25 * seconds}
-    name = "exact" if tried == formula else "best-response"
-    return Profile(f"chain, robots={agents}", "chain", agents, name, 100, tried, formula, parts)
-
-
-def test_growth_is_that_of_what_is_tried_times_that_of_each() -> None:
-    table = ProfileTable((profile_of(2, 20.0, 20, 0.001), profile_of(8, 200.0, 87_380, 0.03)))
-    text = " ".join(str(table).split())
-    assert (
-        "chain: 2 to 8 agents: decisions take 30 times as long: 10 times the joint actions, each "
-        "3 times as long. The largest part is predict (75%); exact then best-response: not as by "
-        "the formula with 8 agents."
-    ) in text
-    assert ["chain,", "robots=2", "exact", "20", "20", "1", "50"] in [
-        line.split() for line in str(table).splitlines()
-    ]
-
-
 def test_teams_without_a_predictor_have_profiles() -> None:
     spec = {"steps": 10, "scenario": {"kind": "line-up"}, "learner": {"kind": "fitted-q"}}
-    (row,) = na.profile(spec, seconds=0.5).rows
-    assert row.seconds["value"] > 0.0
-    assert row.evaluator == "fitted-q"
+    (row,) = na.profile(spec, seconds=0.5).to_dict("records")
+    assert row["value"] > 0.0
+    assert row["evaluator"] == "fitted-q"
 
 
 def test_hierarchies_and_the_single_agent_keep_to_equal_budgets() -> None:
     table = na.profile(EXAMPLES / "equal_computing.toml", seconds=0.01)
-    assert {row.budget for row in table.rows} == {16, 64, 256}
-    assert all(0 < row.tried <= row.budget for row in table.rows if row.budget is not None)
-    single = {row.budget: row.tried for row in table.rows if "single" in row.condition}
-    assert single == {16: 16, 64: 64, 256: 256}
-    assert str(table).splitlines()[0].split()[-1] == "budget"
+    assert {*table["budget"]} == {16, 64, 256}
+    assert ((table["tried"] > 0) & (table["tried"] <= table["budget"])).all()
+    single = table[table["condition"].str.contains("single")]
+    assert dict(zip(single["budget"], single["tried"], strict=True)) == {16: 16, 64: 64, 256: 256}
+    assert next(lines(table)).split()[-1] == "budget"
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ import pytest
 
 from nested_agents.core.agents.peer import PeerSettings
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.plugins.registry import Plugged, Registry
+from nested_agents.core.plugins.models import Plugged
+from nested_agents.core.plugins.registry import Registry
 from nested_agents.core.plugins.settings import Settings
 from nested_agents.core.search import EVALUATORS
 from nested_agents.core.search.exploration import EXPLORATIONS

@@ -86,7 +86,7 @@ def test_what_a_file_system_refuses_is_no_damage(code, name, expected):
     refused = pytest.raises(SpecError)
     with refused as caught, open_to_read(expected / DATABASE):
         raise_(code, name)
-    assert not isinstance(caught.value, connection.DamageError)
+    assert "is damaged" not in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -210,7 +210,9 @@ def copied(path, attempts):
     """Connect to a copy of the files of a database, made within a number of attempts."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
-        connection._copy_files(path, copy, [0.0] * attempts)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(connection, "COPY_WAITS_S", [0.0] * attempts)
+            connection._copy_files(path, copy)
         db = sqlite3.connect(copy)
         yield db
         db.close()

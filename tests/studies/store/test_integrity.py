@@ -15,7 +15,6 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.report import page
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.connection import DamageError
 from nested_agents.studies.store.database import DATABASE, SPEC_FILE, TABLES_OF_TRIALS
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
@@ -180,7 +179,7 @@ def test_after_a_flipped_bit_a_study_ends_with_the_same_or_is_refused(sound, tmp
         path.write_bytes(data)
         try:
             finish(study)
-        except DamageError:
+        except SpecError:
             assert path.name == DATABASE
         else:
             assert content(study) == expected, (path.name, where)

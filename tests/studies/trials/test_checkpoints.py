@@ -10,7 +10,6 @@ import pytest
 
 import nested_agents as na
 from nested_agents import SpecError
-from nested_agents.core.plugins.sources import Checkpoints
 from nested_agents.studies.api.status import Status
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.spec.spec import Spec
@@ -65,7 +64,7 @@ class Killed(BaseException):
 
 def trial_of(table, folder, seconds=0.0, code="of today"):
     trial = trials_of(Spec.of(table))[0]
-    trial.sources.checkpoints = None if folder is None else Checkpoints(folder, seconds, code)
+    trial.sources.checkpoints = None if folder is None else (folder, seconds, code)
     return trial
 
 
@@ -84,8 +83,8 @@ def kill_after(writes, trial, monkeypatch):
     left = [writes]
     write = Checkpoint.write
 
-    def counted(self, reached):
-        write(self, reached)
+    def counted(self, *reached):
+        write(self, *reached)
         left[0] -= 1
         if not left[0]:
             raise Killed
@@ -113,10 +112,10 @@ def test_a_trial_goes_on_to_the_same_bits(name, tmp_path, monkeypatch):
 def test_what_is_done_is_not_done_again(tmp_path, monkeypatch):
     trial = trial_of(TABLES["ours"], tmp_path)
     assert kill_after(3, trial, monkeypatch)
-    reached = Checkpoint(trial).read()
-    assert [row.episode for row in reached.rows] == [0, 1, 2]
+    table, _ = Checkpoint(trial).read()
+    assert [episode for _, episode, *_ in table["rows"]] == [0, 1, 2]
     assert kill_after(1, trial, monkeypatch)
-    assert len(Checkpoint(trial).read().rows) == 4
+    assert len(Checkpoint(trial).read()[0]["rows"]) == 4
     assert not kill_after(1, trial, monkeypatch)  # all is trained; only the evaluation is left
 
 
@@ -189,7 +188,7 @@ def test_a_run_that_is_killed_in_the_middle_of_a_trial(tmp_path):
     os.killpg(running.pid, signal.SIGKILL)
     running.wait()
     now = Status.of(out)
-    assert (now.progress.done, now.progress.left) == (0, 1)
+    assert (now.done, now.left) == (0, 1)
     again = na.run(tmp_path / "study.toml", out, jobs=1, progress=False)
     assert not (out / "checkpoints").exists()
     whole = na.run(tmp_path / "study.toml", tmp_path / "whole", jobs=1, progress=False)

@@ -18,7 +18,7 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers import fork_server
-from nested_agents.studies.workers.fork_server import Answer, call_for, run_in_own_process
+from nested_agents.studies.workers.fork_server import call_for, outcome_of, run_in_own_process
 from nested_agents.studies.workers.runner import ATTEMPTS, Outcome, attempt
 from nested_agents.studies.workers.workers import LokyWorkers
 
@@ -26,7 +26,7 @@ TRIAL = made_up.TRIALS[0]
 
 
 def run_apart(function, trial=TRIAL) -> Outcome:
-    return run_in_own_process(pickle.dumps((function, trial)), trial.seed).outcome(trial)
+    return outcome_of(run_in_own_process(pickle.dumps((function, trial)), trial.seed), trial)
 
 
 def test_only_trials_that_run_files_of_a_user_have_a_process_each() -> None:
@@ -122,8 +122,8 @@ def test_a_killed_fork_server_costs_its_trial_and_another_starts() -> None:
 
 
 def test_an_answer_is_what_became_of_a_trial() -> None:
-    answer = Answer(pickle.dumps((None, 1.5, None)))
-    assert answer.outcome(TRIAL) == Outcome(TRIAL, None, 1.5)
+    answer = pickle.dumps((None, 1.5, None)), ""
+    assert outcome_of(answer, TRIAL) == Outcome(TRIAL, None, 1.5)
 
 
 STATE = """
