@@ -22,7 +22,7 @@ from shapely.affinity import translate
 from shapely.geometry import Point, Polygon
 
 from ....core.numerics import FloatArray
-from ....core.plugins.settings import tuples
+from ....core.plugins.models import tuples
 from ....core.plugins.words import closest
 from .geometry import BoxShape
 from .polygons import (
