@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import click
 from click.core import ParameterSource
 
 PATH = click.Path(path_type=Path)
 """A path, which need not exist."""
+Checked: TypeAlias = Any
+"""Values of options, which click has checked."""
 
 
 def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:

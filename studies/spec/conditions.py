@@ -220,7 +220,7 @@ class Condition(NamedTuple):
         return {self.label: self.settings, **others}
 
     @property
-    def tables(self) -> list[Any]:
+    def tables(self) -> list[SpecTable]:
         """Settings of the condition, its evaluations and its stages as tables."""
         others = [other.model_dump(mode="json") for _, other in self.evaluations]
         stages = [stage.table() for stage in self.curriculum]

@@ -107,8 +107,8 @@ def planning_remark(settings: Mapping[str, Settings]) -> str | None:
     names = join_names(planning, MOST_NAMES)
     rules = dict.fromkeys(_rule_of(settings[condition]) for condition in planning)
     why = f"untrained weights plan by the reward under rule = {', '.join(map(show, rules))}"
-    found = (control_of(condition, settings) for condition in planning)
-    controls = list(dict.fromkeys(filter(None, found)))
+    frozen = (control_of(condition, settings) for condition in planning)
+    controls = list(dict.fromkeys(filter(None, frozen)))
     if not controls:
         return (
             f"{names}: {why}, and no control learns nothing under the same: judge learning by the "

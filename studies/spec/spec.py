@@ -317,9 +317,9 @@ class Spec(Settings):
         for condition in self.conditions():
             lines += condition.settings.warnings()
             lines += condition.settings.remarks()
-            others: list[Any] = [*dict(condition.evaluations).values(), *condition.curriculum]
-            for there in (condition.settings, *others):
-                lines += there.scenario.warnings()
+            stages = (stage.scenario for stage in condition.curriculum)
+            for scenario in (*(own.scenario for own in condition.labeled.values()), *stages):
+                lines += scenario.warnings()
         return tuple(dict.fromkeys(lines))
 
     def _of_controls(self) -> Iterator[str]:

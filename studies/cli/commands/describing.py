@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -145,7 +145,7 @@ def several(name: str, default: str, text: str) -> options.Decorator:
     "learner.decision.budget.",
 )
 @options.formats("table", "json", "csv", "latex")
-def cost(topology: tuple[str, ...], form: CostForm, **quantities: Any) -> int:
+def cost(topology: tuple[str, ...], form: CostForm, **quantities: options.Checked) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if requested, measured.
 
     Several numbers of agents, rules and actions give a row for each combination.
@@ -278,7 +278,7 @@ def show(
     scenario: str | None,
     form: view.Form,
     plot: Path | None,
-    **team: Any,
+    **team: options.Checked,
 ) -> int:
     """Show a topology: edges, order of decision, communication, lookahead, cost.
 

@@ -1,7 +1,6 @@
 """The command that fits laws of growth to the results of a study."""
 
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -41,7 +40,7 @@ def fit(
     where: str | None,
     form: Form,
     trust: bool,
-    **choices: Any,
+    **choices: options.Checked,
 ) -> int:
     """Fit how results grow with the size of teams: exponents, floors, break points, predictions.
 

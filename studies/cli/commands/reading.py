@@ -2,7 +2,7 @@
 
 import io
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import click
 
@@ -118,7 +118,7 @@ def compare(
     where: str | None,
     form: Form,
     trust: bool,
-    **compared: Any,
+    **compared: options.Checked,
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
@@ -286,7 +286,7 @@ def report(directory: Path, out: Path | None, trust: bool) -> int:
 @click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
 @click.option("--full", is_flag=True, help="Print all rules and tables, not only the summary.")
 @options.trust
-def explain(directory: Path, full: bool, trust: bool, **trial: Any) -> int:
+def explain(directory: Path, full: bool, trust: bool, **trial: options.Checked) -> int:
     """Explain a trained team: its rules in words and its self-model.
 
     DIR is the folder of the study. The text with all rules and the figures are written to its

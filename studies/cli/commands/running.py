@@ -3,7 +3,6 @@
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -75,7 +74,7 @@ def run(
     trust: bool,
     figures: tuple[str, ...],
     changes: tuple[str, ...],
-    **running: Any,
+    **running: options.Checked,
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
@@ -113,7 +112,9 @@ def run(
 @options.running
 @options.trust
 @options.changes
-def tune(spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice: Any) -> int:
+def tune(
+    spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice: options.Checked
+) -> int:
     """Search for better settings of a spec on separate seeds; the same command resumes it.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
@@ -148,7 +149,7 @@ def tune(spec: Path, out: Path, trust: bool, changes: tuple[str, ...], **choice:
 @click.option("--timed/--no-timed", default=True, help="Run pilot episodes of every condition.")
 @options.trust
 @options.changes
-def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Any) -> int:
+def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: options.Checked) -> int:
     """Estimate the time of a study, and the differences that it can detect.
 
     SPEC.toml is the spec of the study. Every condition runs some pilot episodes; nothing is kept.
@@ -165,7 +166,7 @@ def plan(spec: Path, trust: bool, changes: tuple[str, ...], **supposed: Any) -> 
 @options.running
 @options.checkpoint
 @options.trust
-def retry(directory: Path, trust: bool, **running: Any) -> int:
+def retry(directory: Path, trust: bool, **running: options.Checked) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
     DIR is the folder of the study.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -74,7 +74,7 @@ def scalability(
     where: str | None,
     form: Form,
     trust: bool,
-    **choices: Any,
+    **choices: options.Checked,
 ) -> int:
     """Show which hierarchy scales, up to how many agents, and at which cost.
 
