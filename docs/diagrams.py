@@ -141,11 +141,11 @@ def communication_lookahead() -> Figure:
     results = load("edges").results
     cases = {
         "both": "evaluation",
-        "lookahead only": "evaluation:considered only",
-        "communication only": "evaluation:told only",
+        "lookahead\nonly": "evaluation:considered only",
+        "communication\nonly": "evaluation:told only",
         "neither": "evaluation:neither",
     }
-    figure = Figure(figsize=(WIDTH + 1.2, 2.7), layout="constrained")
+    figure = Figure(figsize=(WIDTH + 0.3, 3.0), layout="constrained")
     for axes, robots in zip(figure.subplots(1, 3, sharey=True), (2, 4, 8), strict=True):
         for row, phase in enumerate(cases.values()):
             value, low, high = success_of(results, f"value_of=own, robots={robots}", phase)
@@ -153,7 +153,7 @@ def communication_lookahead() -> Figure:
             axes.barh(row, value, 0.62, color=color, hatch=hatch, edgecolor="white")
             axes.plot([low, high], [row, row], color="black", lw=1.2)
             axes.text(high + 0.03, row, format_number(value), va="center")
-        axes.set(xlim=(0, 1.3), xlabel="success", title=f"{robots} robots, {2 * robots} agents")
+        axes.set(xlim=(0, 1.45), xlabel="success", title=f"{robots} robots,\n{2 * robots} agents")
         axes.set_xticks((0.0, 0.5, 1.0))
         axes.set_yticks(range(len(cases)), list(cases))
     axes.invert_yaxis()
@@ -273,28 +273,27 @@ def predictions() -> Figure:
 def learning_curves() -> Figure:
     """Draw success by episode of two teams and three controls, and the orientation of the box."""
     results = load("learning-curve").results
-    figure = Figure(figsize=(WIDTH + 0.6, 3.6), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1.5, 1))
+    figure = Figure(figsize=(WIDTH - 0.6, 4.9), layout="constrained")
+    above, below = figure.subplots(2, 1, height_ratios=(1.4, 1), sharex=True)
     names = {
-        "own-value": "learning team", "planner": "planner (knows the reward)",
+        "own-value": "learning team", "planner": "planner (knows reward)",
         "frozen": "untrained team", "paper": "constants of the paper",
-        "pose": "learning team, within 15 degrees",
+        "pose": "learning, within 15°",
     }  # fmt: skip
     for line, (condition, label) in enumerate(names.items()):
         success = results.success(condition, "training")
         episodes = np.arange(0, success.shape[1], 2)
         pairs = [na.rate(success[:, e : e + 2]) for e in episodes]
-        draw_points(left, episodes + 1.5 + 0.1 * line, pairs, line, label)
+        draw_points(above, episodes + 1.5 + 0.1 * line, pairs, line, label)
     errors = results.values("pose", "final_orientation_deg")
     means = [na.bootstrap(errors[:, e : e + 2].mean(axis=1)) for e in episodes]
-    draw_points(right, episodes + 1.5, means, line, "")
-    right.axhline(15.0, color=GRAY, linestyle=":", label="required: 15 degrees")
-    left.set(ylabel="success", ylim=(-0.05, 1.05))
-    right.set(ylabel="final orientation error [deg]", ylim=(0.0, None))
-    for axes in (left, right):
-        axes.set(xlabel="episode of training", xticks=(1, 5, 10, 15, 20))
+    draw_points(below, episodes + 1.5, means, line, "")
+    below.axhline(15.0, color=GRAY, linestyle=":", label="required: 15°")
+    above.set(ylabel="success", ylim=(-0.05, 1.05))
+    below.set(ylabel="orientation\nerror [deg]", ylim=(0.0, None))
+    below.set(xlabel="episode of training", xticks=(1, 5, 10, 15, 20))
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
-    return titled(figure, "Two robots learn to push a box to a position or a pose")
+    return titled(figure, "Two robots learn to push a box")
 
 
 def hierarchies() -> Figure:
@@ -398,14 +397,13 @@ def games() -> Figure:
     for case in cases:
         values = list(case.values.values())
         table[settings.index(case.setting), systems.index(case.system)] = float(values[-1].value)
-    figure = Figure(figsize=(WIDTH + 1.4, 5.0), layout="constrained")
+    figure = Figure(figsize=(WIDTH + 0.6, 5.0), layout="constrained")
     axes = figure.subplots()
     axes.imshow(table, cmap="Blues", vmin=0, vmax=1.9, aspect="auto")
     for row, column in np.ndindex(*table.shape):
-        axes.text(
-            column, row, format_number(table[row, column]), ha="center", va="center", size=8.5
-        )
-    labels = [f"{g.replace(':', ' ')}, {e.replace('b', 'B', 1)}" for g, e in settings]
+        axes.text(column, row, format_number(table[row, column]), ha="center", va="center", size=9)
+    names = [g.removesuffix("-climbing").replace(":", " ") for g, _ in settings]
+    labels = [f"{g}, {e.replace('b', 'B', 1)}" for g, (_, e) in zip(names, settings, strict=True)]
     axes.set_yticks(range(len(settings)), labels)
     axes.set_xticks(range(len(systems)), systems, rotation=45, ha="right", rotation_mode="anchor")
     axes.spines[:].set_visible(False)

@@ -2,11 +2,11 @@
 A broken joint of HalfCheetah
 =============================
 
-PPO of stable-baselines3 learns to run with six joints; then one of them has no drive. The table has
-what that costs at once, and what is left after learning went on with the broken joint. Beside it
-learning goes on for as long without a fault. Needs ``pip install stable-baselines3 mujoco``. Then
-``python broken_joint.py cheetah.json 500000 300000 2``: where the returns go, the steps to learn
-before and after the fault, and the seeds to train.
+PPO of stable-baselines3 learns to run with six joints; then one of them loses its drive. The table
+shows the loss just after the fault and after further training with it. A control trains equally
+long without a fault. Needs ``pip install stable-baselines3 mujoco``. Then run
+``python broken_joint.py cheetah.json 500000 300000 2``. The arguments are the file for the returns,
+the numbers of training steps before and after the fault, and the number of seeds.
 """
 
 # sphinx_gallery_thumbnail_path = "figures/wheel_failure.png"

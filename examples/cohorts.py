@@ -1,10 +1,10 @@
 """
-A topology of one's own
-=======================
+Your own topology
+=================
 
 A topology is a function from the names of the agents, and the same names by robot, to pairs
-(superior, subordinate). Here the robots are cohorts, one above the other: the wheels of a robot do
-not see each other, but every wheel of the robots below.
+(superior, subordinate). Here every wheel of a robot is above every wheel of the next robot. The
+wheels of one robot are not connected.
 """
 
 # sphinx_gallery_thumbnail_path = "figures/topology-cohorts.svg"

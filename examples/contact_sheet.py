@@ -1,6 +1,6 @@
 """
-All boxes, and where they are to be pushed
-==========================================
+All boxes with their goals
+==========================
 
 Writes the picture ``boxes.png``, or the one named as argument, and prints the boxes' mass
 properties.

@@ -2,10 +2,10 @@
 Faults in an environment of Gymnasium
 =====================================
 
-PPO of stable-baselines3 learns to balance a pole; then its motor is late by two steps, or turns the
-other way round, and comes back after six episodes. The table tells what that costs, and a random
-policy beside it. Needs ``pip install stable-baselines3``. Then
-``python fault_recovery.py``, or with a number of steps: ``python fault_recovery.py 50000``.
+PPO of stable-baselines3 learns to balance a pole. Then its motor is delayed by two steps, or
+reversed, for six episodes. The table shows the loss of PPO and of a random policy. Needs
+``pip install stable-baselines3``. Then run ``python fault_recovery.py``, or give a number of
+training steps: ``python fault_recovery.py 50000``.
 """
 
 # sphinx_gallery_thumbnail_path = "figures/wheel_failure.png"

@@ -1,9 +1,9 @@
 """
-Three uses in thirty lines
-==========================
+The toolkit in a notebook
+=========================
 
-One's own hierarchy, a study of it by the number of robots, and what hierarchies cost: all from
-Python, as in a notebook. A cell that ends with ``study``, ``comparison`` or ``table`` shows it.
+Your own hierarchy, a study of it for several numbers of robots, and a table of costs, in Python. A
+cell that ends with ``study``, ``comparison`` or ``table`` shows it.
 """
 
 # sphinx_gallery_thumbnail_path = "figures/scaling.png"

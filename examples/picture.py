@@ -2,8 +2,8 @@
 One moment of an episode as a picture
 =====================================
 
-Two robots push a box with holes to its goal; a wheel of the first has seized. Writes ``push.png``,
-or the picture named as argument.
+Two robots push a box with holes to its goal; one wheel of the first robot has seized.
+Writes ``push.png``, or the picture named as argument.
 """
 
 # sphinx_gallery_thumbnail_path = "figures/push.png"

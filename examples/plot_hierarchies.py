@@ -2,8 +2,8 @@
 Hierarchies
 ===========
 
-Who is above whom, for six agents on three robots. An agent tries the joint actions of all that are
-below it, so the hierarchy decides what a decision costs.
+Four hierarchies of six agents on three robots. An agent tries the joint actions of all agents below
+it, so the hierarchy determines the cost of a decision.
 """
 
 import matplotlib.pyplot as plt

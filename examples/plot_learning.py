@@ -3,7 +3,7 @@ A study in Python
 =================
 
 A spec is a dictionary, a study keeps its rows in a folder, and results come back as arrays. The
-scenario is the small one, carts on a line, so that this takes seconds.
+scenario, carts on a line, is small, so the study takes seconds.
 """
 
 import tempfile

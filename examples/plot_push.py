@@ -2,8 +2,8 @@
 Two robots push a box
 =====================
 
-Every wheel speeds up, and nobody decides. As long as all wheels turn, this pushes a concave box
-towards its goal; then the front left wheel of the first robot seizes.
+All wheels speed up, and no agent decides. This pushes a concave box toward its goal until the front
+left wheel of the first robot seizes.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Robots that surround a fleeing target
 =====================================
 
-An environment that no setting of the toolkit was made for, written by the pages alone; the page
-*My environment is not learned* goes through it. Run it by
+An environment for which no preset was tuned; the page *Troubleshooting: nothing is learned* uses it
+as its example. Run it by
 ``./dev exec nested-agents run examples/pursuit.toml --out out/pursuit``, check it by
 ``./dev exec nested-agents check examples/pursuit.py:Pursuit``.
 """

@@ -2,9 +2,9 @@
 A study on Slurm, in parts
 ==========================
 
-Submits a study as an array of jobs by submitit (``pip install submitit``), each of which runs a
-part of the seeds, and exits. The same command later submits the parts that have not finished; when
-all have, it prints their table as that of one study: ``python slurm_parts.py study.toml out 8``.
+Submits a study as an array of jobs with submitit (``pip install submitit``) and exits. Each job
+runs a part of the seeds. The same command later submits the parts that have not finished; when all
+have finished, it prints the table of the whole study: ``python slurm_parts.py study.toml out 8``.
 """
 
 import sys

@@ -2,7 +2,7 @@
 A tank that pumps fill or empty
 ===============================
 
-A whole scenario of one's own: its settings, the scenario and its prediction. Run it as a study by
+A complete scenario: settings, environment and prediction. Run it as a study by
 ``./dev exec nested-agents run examples/tank.toml --out out/tank``, check it by
 ``./dev exec nested-agents check examples/tank.py:Tank``.
 """

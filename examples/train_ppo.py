@@ -2,9 +2,9 @@
 Train PPO of stable-baselines3 in any of our environments
 =========================================================
 
-One agent drives all wheels in an environment that Gymnasium makes by its id; four copies run side
-by side. Needs ``pip install stable-baselines3``. Then ``python train_ppo.py``, or with a number of
-steps and the id of another environment: ``python train_ppo.py 200000 NestedAgents/Arm-v0``.
+One policy drives all wheels in a registered Gymnasium environment; four copies run in parallel.
+Needs ``pip install stable-baselines3``. Then run ``python train_ppo.py``, or give a number of steps
+and the id of another environment: ``python train_ppo.py 200000 NestedAgents/Arm-v0``.
 """
 
 import sys

@@ -1,10 +1,10 @@
 """
-Train MAPPO of TorchRL in any of our worlds
-===========================================
+Train MAPPO of TorchRL in any of our environments
+=================================================
 
-A player for every agent in an environment of PettingZoo that is made by its id: actors share their
-weights, and one critic sees all. Needs ``pip install torchrl``. Then ``python train_torchrl.py``,
-or with a number of joint steps and the id of another world: ``python train_torchrl.py 100000
+Every agent is a player in a registered PettingZoo environment. Actors share their weights, and one
+critic sees all states. Needs ``pip install torchrl``. Then run ``python train_torchrl.py``, or give
+a number of joint steps and the id of another environment: ``python train_torchrl.py 100000
 NestedAgents/Arm-v0``.
 """
 

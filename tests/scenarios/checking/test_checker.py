@@ -721,7 +721,6 @@ BLIND: dict[str, Callable[[], Scenario]] = {
     "predictions a little off": inexact(lambda p, i, a: p.states(i, a) + 1e-3),
     "after": predicting(after=lambda self, joint_action: self),
     "partners": line(partners=lambda self: (0, 0)),
-    "run_episode": line(run_episode=lambda self, *args, **kwargs: None),
     "animate": line(
         animate=lambda self, recording, path: None, constants_of_episode=lambda self: {}
     ),
