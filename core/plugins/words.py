@@ -44,7 +44,7 @@ def show(value: object, width: int | None = 60) -> str:
     elif isinstance(value, Sequence):
         text = "[" + ", ".join(show(v, width) for v in value) + "]"
     else:
-        text = str(value)
+        text = " ".join(str(value).split())  # tables of pandas have lines
     return text if width is None or len(text) <= width else text[: width - 3] + "..."
 
 
@@ -154,8 +154,10 @@ def expect_each(
     Traceback (most recent call last):
     ValueError: agents[1] = 6, allowed: the names of agents
     """
-    for name, values in sequences.items():
-        for index, value in enumerate(() if values is None else values):
+    for name, given in sequences.items():
+        values = () if given is None else given
+        expect(allowed, Iterable, **{name: values})
+        for index, value in enumerate(values):
             expect(allowed, kind, **{f"{name}[{index}]": value})
 
 

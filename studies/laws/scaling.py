@@ -270,6 +270,8 @@ def _fit(
         return "a size occurs twice; conditions differ in something else"
     every = pd.DataFrame({condition: values[condition] for condition in sizes_of})
     frame = every.dropna()
+    if frame.empty:
+        return "no seed has a value at every size"
     try:
         law = fitting.choose(sample_of(sizes, frame))
     except ValueError as error:

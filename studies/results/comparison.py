@@ -381,7 +381,7 @@ def _groups(
         same = groups.setdefault(setting, {}).setdefault(name, c)
         if same != c:
             raise SpecError(f"by = {by!r}: conditions {same!r} and {c!r} differ in no key")
-    return {setting: _put_first(own, reference, known) for setting, own in groups.items()}
+    return {setting: _put_first(own, reference, known, setting) for setting, own in groups.items()}
 
 
 def _level(key: str, value: object) -> str:
@@ -394,12 +394,13 @@ def _level(key: str, value: object) -> str:
 
 
 def _put_first(
-    members: Members, reference: str | None, known: Mapping[str, Collection[str]]
+    members: Members, reference: str | None, known: Mapping[str, Collection[str]], setting: str
 ) -> Members:
     """Return the members of a group, the reference first; `known` has the aliases of labels."""
     if reference is None:
         return members
     first = named(reference, {name: known[c] for name, c in members.items()})
     if first is None:
-        raise SpecError(f"reference = {reference!r}: {closest(reference, members)}")
+        where = f" (with {setting})" if setting else ""
+        raise SpecError(f"reference = {reference!r}: {closest(reference, members)}{where}")
     return {first: members[first]} | members

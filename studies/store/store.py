@@ -191,14 +191,15 @@ class Store:
         """Return the column names and one row per trial, by condition and seed.
 
         The swept keys and the seed are followed by the state, the identity, the last line of the
-        traceback, the seconds of each part and the `numbers`. A missing value is None.
+        traceback, the seconds of each part and the `numbers`. A missing value is None, as is a
+        time of zero: the trial did not measure this part.
         """
         swept = next(iter(self.columns().values()), {})
         names = [n for (n,) in self._db.execute("SELECT DISTINCT name FROM numbers ORDER BY name")]
         values = {
             (i, n): v for i, n, v in self._db.execute("SELECT identity, name, value FROM numbers")
         }
-        parts = ", ".join(f'{part} AS "seconds.{part}"' for part in database.SECONDS)
+        parts = ", ".join(f'nullif({part}, 0.0) AS "seconds.{part}"' for part in database.SECONDS)
         cursor = self._db.execute(
             f"SELECT c.condition, {''.join(f'c.{database.quote(key)}, ' for key in swept)}seed, "
             f"state, identity, error, {parts} FROM trials "

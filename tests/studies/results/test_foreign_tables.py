@@ -335,6 +335,29 @@ def test_the_size_with_the_smallest_loss_may_be_the_best(tmp_path: Path, capsys)
     assert best == {"higher": "8", "lower": "2"}
 
 
+def test_a_law_says_that_no_seed_ran_at_every_size(tmp_path: Path) -> None:
+    rows = [(n, f"{n}-{seed}", n + seed) for n in (2, 4, 8) for seed in range(3)]
+    path = tmp_path / "sizes.csv"
+    pd.DataFrame(rows, columns=["condition", "seed", "score"]).to_csv(path, index=False)
+    (reason,) = na.scaling_law(na.load(path)).analysis.fits.values()
+    assert "no seed" in str(reason)
+
+
+def test_arguments_of_other_types_are_refused_in_one_line(scores) -> None:
+    for arguments in ({"condition": 0}, {"table": scores["right"]}):
+        with pytest.raises(ValueError, match=f"{next(iter(arguments))} = .*allowed: ") as refusal:
+            na.compare_table(**{"table": scores, **arguments})
+        assert "\n" not in str(refusal.value)
+
+
+def test_a_reference_that_a_group_lacks_is_refused_with_the_group(scores) -> None:
+    lacks = scores[(scores["run"] > 3) | (scores["topology"] != "ring")]
+    crossed = lacks.assign(half=np.where(lacks["run"] > 3, "late", "early"))
+    roles = {"condition": ["topology", "half"], "score": "right", "seed": "run", "item": "question"}
+    with pytest.raises(SpecError, match="reference = 'ring'.*early"):
+        na.compare_table(crossed, by="topology", reference="ring", **roles)
+
+
 def test_only_measures_of_the_table_are_proposed(scores) -> None:
     with pytest.raises(SpecError, match=r"known: right, tokens$"):
         na.compare_table(scores, score=["right", "tokens"], measure="token count", **ROLES)

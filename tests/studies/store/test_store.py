@@ -98,6 +98,14 @@ def test_seconds_are_kept_apart(finished):
     assert {row[names.index("seconds.total")] for row in rows} == {1.5}
 
 
+def test_a_part_that_no_trial_measured_took_no_known_time(finished):
+    with sqlite3.connect(finished / DATABASE) as database:
+        database.execute("UPDATE seconds SET physics = 0.0")
+    with Store.open(finished) as store:
+        names, rows = store.trials()
+    assert {row[names.index("seconds.physics")] for row in rows} == {None}
+
+
 def test_a_recording_that_cannot_be_read_is_named(finished):
     trial = made_up.TRIALS[0]
     path = finished / "recordings" / f"{trial.identity}.npz"
