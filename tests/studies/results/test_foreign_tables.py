@@ -354,7 +354,7 @@ def test_a_reference_that_a_group_lacks_is_refused_with_the_group(scores) -> Non
     lacks = scores[(scores["run"] > 3) | (scores["topology"] != "ring")]
     crossed = lacks.assign(half=np.where(lacks["run"] > 3, "late", "early"))
     roles = {"condition": ["topology", "half"], "score": "right", "seed": "run", "item": "question"}
-    with pytest.raises(SpecError, match="reference = 'ring'.*early"):
+    with pytest.raises(SpecError, match=r"reference = 'ring'.*early"):
         na.compare_table(crossed, by="topology", reference="ring", **roles)
 
 
