@@ -264,7 +264,8 @@ class BestResponse(Aggregation):
             return self.predicted_worth(context, joint).reshape(shape)
         equivalent = self._equivalent_of(free)
         planned = equivalent[self._index(plan, free)]
-        predicted = np.setdiff1d(equivalent, planned)
+        distinct = _distinct(equivalent)
+        predicted = distinct[distinct != planned]
         values = np.empty(len(actions))
         values[planned] = value
         if len(predicted):
@@ -273,12 +274,9 @@ class BestResponse(Aggregation):
         return values[equivalent].reshape(shape)
 
     def _equivalent_of(self, agents: tuple[int, ...]) -> IntArray:
-        """Return the first equivalent action of each action of a body's agents.
-
-        Equivalence is known for whole bodies, in agent order.
-        """
+        """Return the first equivalent action of each action of a body's agents."""
         body = self._body_of[agents[0]]
-        if agents == self.problem.groups[body]:
+        if agents == self.problem.groups[body]:  # otherwise equivalence is unknown
             return self._equivalent[body]
         return np.arange(self.n_actions ** len(agents))
 
@@ -300,7 +298,7 @@ class BestResponse(Aggregation):
             if self.problem.budget is not None and budget < 0:
                 break
             values = self._body_values(context, plan, tuple(members), value).ravel()
-            distinct = np.unique(self._equivalent_of(tuple(sorted(members))))
+            distinct = _distinct(self._equivalent_of(tuple(sorted(members))))
             self.count(agent, len(distinct))
             best = distinct[greatest(values[distinct], rng)]
             plan[members] = self._actions[len(members)][best]
@@ -340,7 +338,15 @@ class BestResponse(Aggregation):
 
     def _index(self, plan: IntArray, agents: tuple[int, ...]) -> int:
         """Return the index of the planned actions of agents among all of their joint actions."""
-        return int(np.ravel_multi_index(plan[list(agents)], (self.n_actions,) * len(agents)))
+        index = 0
+        for i in agents:
+            index = index * self.n_actions + int(plan[i])
+        return index
+
+
+def _distinct(equivalent: IntArray) -> IntArray:
+    """Return the actions that are the first of their equivalent ones."""
+    return np.flatnonzero(equivalent == np.arange(len(equivalent)))
 
 
 def _check_common_plan(problem: DecisionProblem) -> None:
