@@ -125,7 +125,7 @@ def test_sampled_actions_have_a_line_and_a_curve():
     assert float(greedy["evaluation success"].value) == 0.25
     assert float(sampled["evaluation success"].value) == 1.0
     assert float(sampled["after 1,000"].value) == 0.5
-    assert [course.decisions.tolist() for course in analysis.cases[:2]] == [[1000, 3000]] * 2
+    assert [decisions.tolist() for *_, decisions, _ in analysis.cases[:2]] == [[1000, 3000]] * 2
     figure = draw_figures(load_study("experience"), analysis)["experience"]
     assert len(figure.axes[0].collections) == 3  # a band for each curve
     names = [text.get_text() for text in figure.legends[0].get_texts()]
