@@ -19,20 +19,10 @@ from nested_agents.studies.trials.checkpoints import Checkpoint
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import Observer
 
-PPO = {"environments": 4, "rollout": 20, "batch_size": 60, "epochs": 1, "hidden": [8]}
+PPO = {"rollout": 20, "batch_size": 60, "epochs": 1, "hidden": [8]}
 MANY = {"study": "experience", "seeds": 1, "decisions": 2400, "steps": 25, "evaluation": 2}
 ONE = {"seeds": 1, "episodes": 4, "steps": 12, "evaluation": 1, "keep_teams": True}
 TABLES = {
-    "spread": {**MANY, "scenario": {"kind": "spread"}, "learner": {"kind": "mappo", **PPO}},
-    "arm": {
-        **MANY, "scenario": {"kind": "kinematic-chain", "joints": 3}, "steps": 40,
-        "learner": {"kind": "hierarchy-ppo", **PPO},
-    },
-    "box": {**MANY, "learner": {"kind": "ippo", **PPO}, "decisions": 1300, "steps": 60},
-    "worlds by a loop": {
-        **MANY, "scenario": {"infrared": {"noise": 0.1}}, "decisions": 300, "steps": 30,
-        "learner": {"kind": "hierarchy-ppo", **PPO},
-    },
     "one world, by decisions": {**MANY, "decisions": 40, "steps": 10},
     "ours": ONE,
     "fitted": {**ONE, "preset": "fitted-q", "scenario": {"kind": "line-up"}},
