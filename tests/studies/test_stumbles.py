@@ -48,6 +48,20 @@ def test_ticks_of_logarithmic_axes_are_plain_numbers(values: list[float]) -> Non
     assert not any("times" in text or "^" in text for text in shown)
 
 
+def test_the_legend_of_a_cost_figure_is_not_cut(tmp_path, monkeypatch) -> None:
+    from nested_agents.studies.cost import figure as module
+
+    kept: list[Figure] = []
+    monkeypatch.setattr(module.figures, "write", lambda figure, path: kept.append(figure))
+    topologies = ["chain", "tree:2", "teams", "chain:interleaved"]
+    module.draw(na.cost_table(topologies, [2, 4]).rows, tmp_path / "cost.png")
+    (figure,) = kept
+    figure.draw_without_rendering()
+    extent = figure.legends[0].get_window_extent()
+    assert extent.x0 >= 0.0
+    assert extent.x1 <= figure.bbox.width
+
+
 def test_the_paper_s_numbers_stand_beside_ours(capsys) -> None:
     assert main(["cost"]) == 0
     assert "The paper prints 2.45e12 (nested) and 1.1e27 (single" in capsys.readouterr().out
@@ -190,5 +204,5 @@ def test_a_file_that_cannot_be_written_is_called_by_its_own_name(
     reasons = {"nowhere/a.svg": "No such file or directory", "file/a.svg": "Not a directory",
                "folder.svg": "Is a directory"}  # fmt: skip
     for path, reason in reasons.items():
-        assert main(["topology", "show", "chain", "--plot", path]) == 2
+        assert main(["cost", "--plot", path]) == 2
         assert capsys.readouterr().err == f"nested-agents: error: {path}: {reason}\n"

@@ -145,7 +145,10 @@ def several(name: str, default: str, text: str) -> options.Decorator:
     "learner.decision.budget.",
 )
 @options.formats("table", "json", "csv", "latex")
-def cost(topology: tuple[str, ...], form: CostForm, **quantities: options.Checked) -> int:
+@options.plot
+def cost(
+    topology: tuple[str, ...], form: CostForm, plot: Path | None, **quantities: options.Checked
+) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if requested, measured.
 
     Several numbers of agents, rules and actions give a row for each combination.
@@ -159,8 +162,17 @@ def cost(topology: tuple[str, ...], form: CostForm, **quantities: options.Checke
             texts = quantities[name]
             quantities[name] = numbers(name, texts) if texts else None
         if quantities["measured"]:
+            if plot is not None:  # a figure that cannot be read is refused before anything is timed
+                from ...cost.figure import check
+
+                check(cost_table(topology, **{**quantities, "measured": False}).rows, plot)
             say("Measuring. Code is compiled first; steps of over about a second are left out.")
         rows = cost_table(topology, **quantities).rows
+        if plot is not None:
+            from ...cost.figure import draw
+
+            draw(rows, plot)
+            say(f"figure  {plot}")
     print_data(f"{format_rows(rows, form)}\n")
     return 0
 

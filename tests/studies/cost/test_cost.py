@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 import sys
 from dataclasses import asdict, replace
 from fractions import Fraction
@@ -25,8 +26,10 @@ from nested_agents.studies.cost.cost import (
     messages,
     step_formula,
 )
+from nested_agents.studies.cost.figure import draw
 from nested_agents.studies.cost.formats import format_rows
 from nested_agents.studies.cost.table import cost_table
+from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")
 
@@ -156,6 +159,9 @@ def test_numbers() -> None:
         (("--topology", "--format", "csv"), "--topology --format: is an option"),
         (("--topology", "per-robot"), "agents = 'body', topology = 'chain'"),
         (("--format", "xml"), "'xml' is not one of 'table', 'json', 'csv', 'latex'"),
+        (("--plot", "cost.txt"), "cost.txt: suffix must be"),
+        (("--plot", "cost.svg", "--topology", *FIVE), "5 topologies and the single agent, allowed"),
+        (("--plot", "cost.svg", "--rules", "1:13"), "13 pairs of rules and actions, allowed"),
         (("--topology", "a=chain", "a=star"), "'a' more than once; name each: LABEL=chain"),
         (("--topology", "a=b=chain"), "topology 'b=chain'"),
     ],
@@ -303,11 +309,28 @@ def test_the_formula_stands_beside_what_is_not_measured(said, form: str) -> None
     assert "0 of 0" not in out
 
 
-def test_measured_tables(said) -> None:
-    status, out, _ = said("--agents", "1:2", "--topology", "chain", "single-agent", "--measured")
+def test_the_legend_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+    monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
+    labels = {"chain": "chain", "evenodd.py:even_odd": "star"}
+    rows = [row for t in labels.values() for row in cost_table([t], [4, 8]).rows]
+    names = {text: label for label, text in labels.items()}
+    draw([replace(row, topology=names[row.topology]) for row in rows], tmp_path / "cost.svg")
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
+
+
+def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
+    figure = tmp_path / "cost.svg"
+    status, out, _ = said("--agents", "1:2", "--topology", "chain", "single-agent", "--measured",
+                          "--plot", str(figure))  # fmt: skip
     assert status == 0
     assert "All counts equal the formulas in 4 of 4 rows." in out
     assert max(map(len, out.splitlines())) <= 80
+    assert "<svg" in figure.read_text()
     rows = cost_table(["chain"], [2], measured=True).rows
     (record,) = json.loads(format_rows(rows, "json"))
     assert record["joint_actions_per_step"] == record["joint_actions_formula_per_step"] == 20
@@ -393,6 +416,33 @@ def test_the_paper_s_numbers_are_reproduced() -> None:
     assert row.nested_asymptotic == 450 * 5**7 * 16**4 * Fraction(16, 15) == 2_457_600_000_000
     assert str(row.nested_asymptotic)[:3] == "245"
     assert f"{row.single_agent:.1e}" == "1.1e+27"
+
+
+@pytest.mark.parametrize("agents", ["2:4", "2:10", "1:16", "1:300"])
+def test_the_axis_of_operations_is_their_logarithm(said, agents, tmp_path, monkeypatch) -> None:
+    drawn = []
+    monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
+    names = ("chain", "best-response", "fitted-q", "hierarchy-ppo")
+    command = ("--agents", agents, "--topology", *names, "single-agent", "--plot", "cost.png")
+    assert said(*command)[0] == 0
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    assert axes.get_ylabel() == "log10(operations)"
+    shown = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert shown == [*names, "single agent (Eq. 23)"]
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        ticks = axis.get_majorticklocs()
+        assert sum(low <= tick <= high for tick in ticks) >= 3
+        labels = [label.get_text().replace(",", "") for label in axis.get_majorticklabels()]
+        assert list(map(float, labels)) == pytest.approx(ticks)
+        assert not len(axis.get_minorticklocs())
+    n = max(numbers("agents", [agents]))
+    lines = {line.get_color(): line.get_ydata() for line in axes.lines if len(line.get_ydata()) > 1}
+    single = Fraction((78125 * 16) ** n * 450)
+    assert lines["black"][-1] == pytest.approx(math.log10(single.numerator))
+    assert len(lines) == 5
 
 
 @pytest.mark.parametrize(("agents", "is_said"), [("5", False), ("5:6", True)])
