@@ -15,6 +15,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core.interface.measures import Measure, main_measure
+from ...core.numerics import working_seconds
 from ..catalogue.experience import stops
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
@@ -188,11 +189,12 @@ def pilot(trial: Trial) -> tuple[float, float]:
     start = perf_counter()
     session = Session(short)
     warm_up = _train(session, 0)
-    compiled = perf_counter()
+    startup = perf_counter() - start
+    compiled = working_seconds()  # what an update of weights compiles later is no time of training
     steps = _train(session, warm_up) - warm_up
-    trained = perf_counter()
+    trained = working_seconds()
     rows = [row for row in session.finish().rows if row.phase != "training"]
-    evaluated = perf_counter()
+    evaluated = working_seconds()
     if trial.decisions is None:
         n_episodes = sum(stage.episodes for stage in trial.curriculum) + trial.episodes
         training = n_episodes * (trial.steps if steps >= short.steps else steps)
@@ -204,7 +206,7 @@ def pilot(trial: Trial) -> tuple[float, float]:
     if rows:
         share = longest / max(row.steps for row in rows) if longest > max_steps else 1.0
         seconds += n_evaluations * share * (evaluated - trained)
-    return seconds, compiled - start
+    return seconds, startup
 
 
 def _train(session: Session, done: int) -> int:
