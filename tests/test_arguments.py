@@ -145,7 +145,7 @@ def test_a_wrong_element_is_named_with_its_index(name, argument, wrong, monkeypa
 def test_pairs_are_of_two_and_of_indices_that_there_are() -> None:
     with pytest.raises(ValueError, match=r"^edges\[0\] = \['a'\], allowed: pairs of names$"):
         na.Hierarchy(("a", "b"), [("a",)])
-    with pytest.raises(ValueError, match=r"interactions\[1\] = \(0, 2\): must be pairs of agent"):
+    with pytest.raises(ValueError, match=r"interactions\[1\] = \(0, 2\): must be 2 agent"):
         na.build_hierarchy(**JOINED, interactions=[(0, 1), (0, 2)])
 
 

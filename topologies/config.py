@@ -219,7 +219,7 @@ def build(
             named = _names_at(agents, bodies, "bodies")
             check_names([name for body in named for name in body], agents, "bodies")
         if interactions is not None and dict(settings).get("shape") == "scenario":
-            pairs = _names_at(agents, interactions, "interactions")
+            pairs = _names_at(agents, interactions, "interactions", size=2)
             settings = settings.model_copy(update={"edges": tuple(pairs)})
         if settings.kind in TOPOLOGIES.built_in:
             graph = settings.build(agents, named)
@@ -299,14 +299,21 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
     return settings
 
 
-def _names_at(agents: Names, groups: Sequence[Sequence[int]], key: str) -> Bodies:
+def _names_at(
+    agents: Names, groups: Sequence[Sequence[int]], key: str, size: int | None = None
+) -> Bodies:
     """Return the names of agents in groups of their indices; refuse other values."""
     indices = range(len(agents))
-    try:
-        return [tuple(agents[indices.index(i)] for i in group) for group in groups]
-    except (TypeError, ValueError):
-        allowed = f"groups of agent indices, 0 to {len(agents) - 1}"
-        raise ValueError(f"{key} = {quote(groups)}: must be {allowed}") from None
+    named = []
+    for k, group in enumerate(groups):
+        try:
+            named.append(tuple(agents[indices.index(i)] for i in group))
+        except (TypeError, ValueError):
+            named.append(())
+        if len(named[-1]) != (size or len(named[-1]) or 1):
+            allowed = f"{size or 'groups of'} agent indices, 0 to {len(agents) - 1}"
+            raise ValueError(f"{key}[{k}] = {quote(group)}: must be {allowed}")
+    return named
 
 
 def _arguments(kind: str, text: str) -> Keys:

@@ -10,6 +10,7 @@ from ...core.agents.loop import world_seed
 from ...core.interface.abilities import measurements_of
 from ...core.interface.scenario import Scenario, Transition, checked_scenario
 from ...core.numerics import IntArray
+from ...core.plugins.words import expect
 
 StepRecord = dict[str, object]
 """Values of one step by dotted name, without measured times."""
@@ -91,6 +92,7 @@ def start(scenario: Scenario, seed: int, episode: int) -> StepRecord:
 
 def transition_fields(transition: Transition) -> Iterator[tuple[str, object]]:
     """Yield the values of a transition by dotted name, not copied."""
+    expect("a Transition", Transition, step=transition)
     fields = dict(vars(transition), twists=transition.measured_twists())
     return _flat({name: value for name, value in fields.items() if name != "absorbing"})
 

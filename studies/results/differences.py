@@ -200,7 +200,7 @@ def select_shared(values: Sequence[BySeed]) -> list[Array]:
     return [own.loc[seeds].to_numpy() for own in values]
 
 
-def difference(first: ArrayLike, second: ArrayLike) -> Estimate:
+def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
     """Return the first success rate minus the second, from outcomes ``(n_runs, n_episodes)``.
 
     The interval combines those of the two rates (Newcombe 1998; Zou and Donner 2008). It treats
@@ -213,7 +213,7 @@ def difference(first: ArrayLike, second: ArrayLike) -> Estimate:
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '1.00 [0.54, 1.00]'
     """
-    return difference_of_estimates(rate(first), rate(second))
+    return difference_of_estimates(rate(first, level), rate(second, level))
 
 
 def difference_of_estimates(first: Estimate, second: Estimate) -> Estimate:

@@ -20,6 +20,7 @@ PROGRAMS = sorted(FOLDER.rglob("*.py"))
 PUBLIC = {path.stem for path in (ROOT / "nested_agents").glob("[a-z]*.py")}
 """Public modules of the package."""
 DEPENDENCIES = {
+    "gymnasium",
     "matplotlib",
     "networkx",
     "numpy",

@@ -185,7 +185,7 @@ def test_shapes_leaves_out_contact(carts):
 
 def test_what_is_not_recorded_is_not_replayed(study):
     with Store.open(study) as store:
-        (remark,) = replays(store, read(store), trials_of(SPEC)).remarks
+        (remark,) = replays(store, read(store), trials_of(SPEC))["remarks"]
     assert remark == "Not shown because the scenario records no episodes: 1 (2 seeds), 2 (2 seeds)."
     with pytest.raises(SpecError, match="no replay: Carts does not draw its episodes"):
         load(study).replay()

@@ -519,10 +519,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "twins": (line(__init__=twins), "form: agents .*, of different names"),
     "groups": (line(__init__=crossed), "form: groups .* must hold the 2 agents once each"),
     "raises": (line(step=raising), r"form: KeyError in raising, test_checker.py:\d+: .two.*lines"),
-    "tuple": (
-        line(step=a_tuple),
-        "form: AttributeError in .*: 'tuple' object has no attr",
-    ),
+    "tuple": (line(step=a_tuple), r"form: ValueError in .*: step = .*, allowed: a Transition"),
     "all alike": (
         predicting(alike=np.zeros((2, 4), dtype=int)),
         r"predictions: distance of agent . differs after joint actions \[.*\] and \[.*\], which",
