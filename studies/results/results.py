@@ -242,7 +242,7 @@ def pad_rows(rows: Sequence[Array]) -> Array:
     """
     longest = max(map(len, rows))
     if all(len(row) == longest for row in rows):
-        return np.stack(rows)
+        return np.concatenate(rows).reshape(len(rows), longest)  # faster than `np.stack`
     padded = np.full((len(rows), longest), np.nan)
     for own, row in zip(padded, rows, strict=True):
         own[: len(row)] = row

@@ -27,6 +27,8 @@ RESAMPLES = 4000
 """Resamples of the bootstrap of a mean."""
 MAX_VALUES = 2**20
 """Number of values that are resampled at a time, 8 MB, so that memory is bounded."""
+MAX_KEPT_VALUES = 2**22
+"""Maximum number of weights of resamples that are kept for further tables, 32 MB."""
 NOT_NEGATIVE = (0.0, np.inf)
 """Bounds of times, sizes and counts, see `bootstrap`."""
 OPEN_UNIT = (sys.float_info.min, 1.0 - sys.float_info.epsilon)
@@ -160,13 +162,14 @@ def resample_weights(n_runs: int, count: int, seed: int = 0) -> Iterable[Array]:
     """Return the share of each run in `count` resamples, in blocks ``(m, n_runs)``.
 
     The product with values is their resampled means: a bootstrap without a copy of the values,
-    equal to that of SciPy except for rounding. Few runs share their resamples in all tables.
+    equal to that of SciPy except for rounding. All tables share the resamples of up to a
+    thousand runs.
     """
-    is_small = count * n_runs <= MAX_VALUES
+    is_small = count * n_runs <= MAX_KEPT_VALUES
     return (_kept_weights if is_small else _drawn_weights)(n_runs, count, seed)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def _kept_weights(n_runs: int, count: int, seed: int) -> tuple[Array, ...]:
     return tuple(_drawn_weights(n_runs, count, seed))
 
