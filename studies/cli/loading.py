@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -82,7 +82,7 @@ def trust_beside(*places: Path) -> None:
             _trust(_named_by_copy(folder))
 
 
-def load_spec(path: Path, changes: Iterable[str], *, trust: bool, out: Path | None = None) -> Spec:
+def load_spec(path: Path, changes: Sequence[str], *, trust: bool, out: Path | None = None) -> Spec:
     """Return a changed spec; `trust` allows the code of the study beside it or in a folder."""
     from ..spec.spec import Spec
 

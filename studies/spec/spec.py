@@ -13,7 +13,7 @@ import itertools
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
@@ -43,7 +43,7 @@ from .resolution import (
     sections_of,
 )
 from .studies import STUDIES
-from .tables import SWEEP, SpecTable, TomlTable, assignment, override, spec_text
+from .tables import SWEEP, SpecTable, TomlTable, assignment, flat, override, spec_text
 
 MOST_TRIALS = 100_000
 """Maximum number of trials of a study."""
@@ -255,7 +255,7 @@ class Spec(Settings):
 
     @classmethod
     def load(
-        cls, path: str | PathLike[str], changes: Iterable[str] = (), study: Path | None = None
+        cls, path: str | PathLike[str], changes: Sequence[str] = (), study: Path | None = None
     ) -> Spec:
         """Read a TOML file and apply ``key=value`` changes.
 
@@ -278,7 +278,7 @@ class Spec(Settings):
     def parse(
         cls,
         text: str,
-        changes: Iterable[str] = (),
+        changes: Sequence[str] = (),
         title: str = "spec",
         sources: Sources | None = None,
     ) -> Spec:
@@ -297,6 +297,14 @@ class Spec(Settings):
         for change in changes:
             with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
+        sweep = table.get(SWEEP)
+        swept = dict(flat(sweep)) if isinstance(sweep, Mapping) else {}
+        for change in changes:
+            if key := next((key for key, _ in flat(assignment(change)) if key in swept), None):
+                raise SpecError(
+                    f"--set {change}: has no effect, because the spec sweeps {key}; "
+                    f"set {SWEEP}.{key}, a list of values"
+                )
         return cls.of(table, sources)
 
     def conditions(self) -> tuple[Condition, ...]:

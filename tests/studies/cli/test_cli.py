@@ -246,6 +246,9 @@ BAD = {
     "run {spec} --out x --set episodes": "--set episodes: expected key=value",
     "run {spec} --out x --set topology=chan": "'chan'",
     "run {spec} --out x --set steps=4 seeds=a": "seeds = 'a'",
+    "run {spec} --out x --set sweep.learner.ridge=[1] learner.ridge=2": (
+        "--set learner.ridge=2: has no effect, because the spec sweeps learner.ridge; set sweep."
+    ),
     "run {spec} --out x --jobs 0": "--jobs 0: must be at least 1",
     "run {spec} --out x --jobs two": "'--jobs': 'two' is not a valid integer",
     "run {spec} --out x --jobs 1.5": "'--jobs': '1.5' is not a valid integer",
