@@ -26,8 +26,9 @@ from ..core.plugins.registry import SettingsRegistry
 from ..core.plugins.settings import PartSettings, SettingsError, changed_values
 from ..core.plugins.words import closest, expect, expect_each
 from ..core.search.coordination_graphs import orient
-from .builders import Bodies, Names, check_names, from_networkx, quote
+from .builders import Bodies, Names, from_networkx
 from .files import read_file
+from .names import check_names, quote
 from .strings import ARGUMENTS, Keys
 from .user_functions import call_builder
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from ..core.numerics import nx
 from ..core.plugins import sources
 from ..core.plugins.words import closest, show
-from .builders import check_legible, quote
 from .graphml import node_link_table
+from .names import check_legible, quote
 
 NUMBERED = re.compile(r"n?\d+")
 """Node ids that programs such as yEd and Gephi generate."""

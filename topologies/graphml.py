@@ -9,7 +9,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from .builders import quote
+from .names import quote
 
 DIRECTIONS = {"directed": True, "undirected": False}
 """Values of ``edgedefault``."""

@@ -15,8 +15,9 @@ from ..core.agents.joint import Granularity, joint_blocks
 from ..core.hierarchy.failures import MessageFailure
 from ..core.hierarchy.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
-from .builders import check_legible, names_of
+from .builders import names_of
 from .config import read
+from .names import check_legible
 from .strings import ARGUMENTS
 
 Form = Literal["table", "json"]

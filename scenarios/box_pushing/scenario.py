@@ -25,19 +25,18 @@ from ...core.plugins.words import expect
 from ..faults.settings import Failures
 from .config import BoxPushingSettings
 from .measurements import MEASURES, ORIENTATION
-from .prediction.calibration import APART, CONSTANTS, PushBelief, min_gap
+from .prediction.calibration import CONSTANTS, PushBelief, measured_twists
 from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
 from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, push_model
 from .prediction.settings import BeliefSettings
-from .prediction.twists import mean_twists
 from .states.kernel import progress_of
 from .states.situations import SituationBatch
 from .states.state_spaces import state_space_for
 from .world.boxes import box_for, growth
 from .world.polygons import UNIT
 from .world.reward import Task, reward
-from .world.robots import nominal_effect, robot_for
+from .world.robots import nominal_effect, opposite_wheels, robot_for
 from .world.settings import CONTROL_PERIOD
 from .world.starts import place
 from .world.stepping import advance_many, step_address
@@ -52,8 +51,6 @@ SENSING = 2**32 - 1
 
 class BoxPushing(Scenario):
     """Box pushing: the agents are the wheels of robots, which push a box to a goal.
-
-    It can be drawn, calibrated and predicted exactly.
 
     Parameters
     ----------
@@ -74,7 +71,7 @@ class BoxPushing(Scenario):
     (4, 8)
     """
 
-    measures: tuple[Measure, ...]
+    measures: tuple[Measure, ...] = MEASURES
     has_leader: ClassVar[bool] = False
     """Whether there is a leader above the agents, see `leading`."""
     regression_shapes = tuple((len(signs), len(TWIST_SIGNS)) for signs in (BOX_SIGNS, ROBOT_SIGNS))
@@ -88,8 +85,8 @@ class BoxPushing(Scenario):
                 "build the scenario by settings.build(), or leave out leader"
             )
         self.settings = settings
-        is_oriented = settings.orientation_tolerance is not None
-        self.measures = (*MEASURES, ORIENTATION) if is_oriented else MEASURES
+        if settings.orientation_tolerance is not None:
+            self.measures = (*MEASURES, ORIENTATION)
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
         similar = settings.scaling == "similar"
@@ -153,14 +150,7 @@ class BoxPushing(Scenario):
         ValueError
             If a wheel has none; one line.
         """
-        wheels = [(wheel.x, wheel.y) for wheel in self.robot.wheels]
-        for name, (x, y) in zip(self.robot.wheel_names, wheels, strict=True):
-            if (x, -y) not in wheels:
-                raise ValueError(
-                    f"learner.mirrored: wheel {name!r} of robot "
-                    f"{self.robot.name or 'own'!r} has no wheel opposite"
-                )
-        opposite = [wheels.index((x, -y)) for x, y in wheels]
+        opposite = opposite_wheels(self.robot)
         return tuple(group[k] for group in self.groups for k in opposite)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
@@ -204,16 +194,15 @@ class BoxPushing(Scenario):
         if self.aim is not self.goal:  # a leader's waypoint; the reward is about the goal
             present = present._replace(goal=self.goal)
         distance, approach, turn = progress_of(present)
-        contact = self.world.contact[None]
         strongest = np.maximum.reduce(readings, axis=1)[None]
-        gained = reward(self.task, distance, approach, turn, contact, strongest)[0]
+        gained = reward(self.task, distance, approach, turn, self.world.contact[None], strongest)[0]
         received = gained[self.body] if self.task.by_robot else float(gained[0])
         away = float(distance[0])
         measured = self._measured(away, float(turn[0]))
         terminated = bool(self.task.reached(distance, turn)[0])
         sensed = working_seconds()
         seconds = self.settings.period
-        twists = partial(_twists, before, self.world.poses, seconds, self.robot.radius)
+        twists = partial(measured_twists, before, self.world.poses, seconds, self.robot.radius)
         if terminated:
             # The wheels stop; the box may leave the tolerance before it comes to rest.
             self._advance(np.zeros(len(self.agents)))
@@ -275,8 +264,7 @@ class BoxPushing(Scenario):
 
         return BoxScene(recording).pixels(len(recording["box_pose"]) - 1)
 
-    def _save(self) -> None:
-        # After every step, asked for or not, as saving costs the world its order of contacts.
+    def _save(self) -> None:  # after every step: saving costs the world its order of contacts
         self._saved = None if self._playground is None else self.world.state()
 
     def measure(self) -> dict[str, object]:
@@ -410,13 +398,3 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
             paid = paid[:, one.body]
         rewards = np.broadcast_to(paid, joint_actions.shape)
         return Transitions(states, rewards, reached, ~reached & (away > one.farthest))
-
-
-def _twists(before: FloatArray, after: FloatArray, seconds: float, radius: float) -> FloatArray:
-    """Return the mean twists of robots between poses ``(M + 1, 3)``, the box's standing first.
-
-    If two robots were close, the twist of the box is left out: they may have pushed each other.
-    """
-    twists = mean_twists(before, after, seconds)
-    close = min(min_gap(before[1:], radius), min_gap(after[1:], radius)) <= APART
-    return twists[1:] if close else twists

@@ -173,7 +173,7 @@ def add_legend(figure: Figure, handles: Sequence[Artist], title: str = "", ncols
     )  # fmt: skip
 
 
-def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_of: Any) -> None:
+def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_of: object) -> None:
     """Add a legend of curves above the panels, with as many columns as fit."""
     handles = [handle(label, **look(i), lw=1.6, **look_of) for i, label in enumerate(labels)]
     add_legend(figure, handles, title, ncols=max(1, 90 // (max(map(len, labels)) + 8)))

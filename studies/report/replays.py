@@ -94,10 +94,7 @@ def replays(
     filmed = {film["condition"] for film in films}
     if not_drawn := Counter(t.condition for t in others if t.condition not in filmed):
         missing["Not shown because the scenario cannot draw it, or the page is full"] = not_drawn
-    remarks = []
-    for reason, counts in missing.items():
-        parts = [f"{name} ({count(number, 'seed')})" for name, number in counts.items()]
-        remarks.append(f"{reason}: {', '.join(parts)}.")
+    remarks = [f"{reason}: {_seeds_of(counts)}." for reason, counts in missing.items()]
     return {
         "scenes": scenes,
         "episodes": episodes,
@@ -105,6 +102,11 @@ def replays(
         "films": films,
         "remarks": remarks,
     }
+
+
+def _seeds_of(counts: Mapping[str, int]) -> str:
+    """Return the names of conditions, each with its number of seeds."""
+    return ", ".join(f"{name} ({count(number, 'seed')})" for name, number in counts.items())
 
 
 def _films(store: Store, planned: Sequence[Planned], max_bytes: int) -> list[Json]:

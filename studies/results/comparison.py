@@ -95,19 +95,14 @@ class ComparisonTable(NamedTuple):
 
     def _without_success(self) -> list[str]:
         """Return how many seeds of each condition had no success before the failure, in lines."""
-        counts = {
-            label: (len(group.values[name]), len(self.results.seeds(label)))
-            for group in self.groups
-            for name, label in group.members.items()
-        }
-        texts = [
-            f"{condition}, {total - known} of {total}"
-            for condition, (known, total) in counts.items()
-            if known < total
-        ]
-        if not texts:
-            return []
-        return wrapped(f"Seeds without success before the failure, left out: {'; '.join(texts)}.")
+        texts = []
+        for group in self.groups:
+            for name, condition in group.members.items():
+                total = len(self.results.seeds(condition))
+                if missing := total - len(group.values[name]):
+                    texts.append(f"{condition}, {missing} of {total}")
+        said = f"Seeds without success before the failure, left out: {'; '.join(texts)}."
+        return wrapped(said) if texts else []
 
 
 def title_of(measure: Measure, phase: str) -> str:
@@ -215,7 +210,7 @@ def missing_reference(results: Results) -> list[str]:
     """Return lines that say which condition is the reference if the first one has no trial."""
     present = [condition for condition in results.columns if condition in results.conditions]
     first = next(iter(results.columns), None)
-    if len(present) < 2 or first is None or present[0] == first:
+    if len(present) < 2 or present[0] == first:
         return []
     return wrapped(
         f"No trial of {first}, the first condition, has finished: {present[0]} is the reference "
@@ -334,8 +329,7 @@ def values_by_seed(
                 f"{MIN_LARGEST:g}, or 0; use a smaller unit"
             )
         return measure, known, phase
-    episodes = results.episodes
-    present = {m for m in measures if m in episodes and episodes[m].notna().any()}
+    present = {*results.episodes.dropna(axis=1, how="all")}.intersection(measures)
     return _trial_numbers(results, name, present | {*recovery})
 
 

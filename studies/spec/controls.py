@@ -14,7 +14,7 @@ from textwrap import wrap
 
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.plugins.words import show
-from ...topologies.builders import join_names
+from ...topologies.names import join_names
 from ..errors import WIDTH
 from .tables import SpecTable, TomlTable
 

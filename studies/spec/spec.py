@@ -27,7 +27,7 @@ from ...core.plugins.settings import Settings
 from ...core.plugins.sources import Sources, is_reference, mentions
 from ...core.plugins.trust import modules_in
 from ...core.plugins.words import closest, expect
-from ...topologies.builders import join_names
+from ...topologies.names import join_names
 from ..errors import SpecError, refused
 from ..store.database import DATABASE, SPEC_FILE
 from .conditions import Condition, Curriculum, Length, Name, Override
@@ -297,14 +297,11 @@ class Spec(Settings):
         for change in changes:
             with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
-        sweep = table.get(SWEEP)
-        swept = dict(flat(sweep)) if isinstance(sweep, Mapping) else {}
-        for change in changes:
-            if key := next((key for key, _ in flat(assignment(change)) if key in swept), None):
-                raise SpecError(
-                    f"--set {change}: has no effect, because the spec sweeps {key}; "
-                    f"set {SWEEP}.{key}, a list of values"
-                )
+        if changes:
+            try:
+                _check_effects(changes, table.get(SWEEP))
+            except RecursionError:
+                raise SpecError(f"{title}: is nested too deeply") from None
         return cls.of(table, sources)
 
     def conditions(self) -> tuple[Condition, ...]:
@@ -379,6 +376,17 @@ def first_sentence(text: str) -> str:
     lines = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
     comment = " ".join(line[1:].strip() for line in lines if not line.startswith("#:"))
     return re.split(r"(?<=[?!])\s|[.:](?:\s|$)", comment, maxsplit=1)[0].strip()
+
+
+def _check_effects(changes: Sequence[str], sweep: object) -> None:
+    """Refuse changes of keys that the spec sweeps."""
+    swept = dict(flat(sweep)) if isinstance(sweep, Mapping) else {}
+    for change in changes:
+        if key := next((key for key, _ in flat(assignment(change)) if key in swept), None):
+            raise SpecError(
+                f"--set {change}: has no effect, because the spec sweeps {key}; "
+                f"set {SWEEP}.{key}, a list of values"
+            )
 
 
 def _changed(table: TomlTable, change: TomlTable) -> TomlTable:

@@ -77,7 +77,7 @@ def nested(key: str, value: object) -> TomlTable:
     return typing.cast(TomlTable, value)
 
 
-def flat(table: SpecTable, prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat(table: SpecTable, prefix: str = "") -> Iterator[tuple[str, object]]:
     """Yield the dotted key and the value of every entry; tables are descended into, lists not.
 
     Examples
@@ -141,7 +141,7 @@ def dumps(table: SpecTable) -> str:
     return tomli_w.dumps(_plain(table), multiline_strings=False)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> Any:
     """Return tables without None values and with lists instead of tuples, at any depth."""
     if isinstance(value, Mapping):
         return {key: _plain(inner) for key, inner in value.items() if inner is not None}

@@ -18,7 +18,7 @@ from ..world.robots import resistance
 from ..world.settings import RobotSettings
 from .models import PushModel
 from .push import push
-from .twists import twist_between
+from .twists import mean_twists, twist_between
 
 CONSTANTS = ("load per stiffness", "load per grip", "contact friction")
 """The ground friction of the box over the stiffness of the wheels' servos, and over that of their
@@ -111,3 +111,15 @@ def min_gap(robots: FloatArray, radius: float) -> float:
     i, j = np.triu_indices(len(robots), 1)
     apart = np.hypot(robots[i, 0] - robots[j, 0], robots[i, 1] - robots[j, 1])
     return float(apart.min(initial=np.inf)) - 2.0 * radius
+
+
+def measured_twists(
+    before: FloatArray, after: FloatArray, seconds: float, radius: float
+) -> FloatArray:
+    """Return the mean twists between poses ``(M + 1, 3)``, the box's standing first.
+
+    If two robots were close, the twist of the box is left out: they may have pushed each other.
+    """
+    twists = mean_twists(before, after, seconds)
+    close = min(min_gap(before[1:], radius), min_gap(after[1:], radius)) <= APART
+    return twists[1:] if close else twists

@@ -119,6 +119,24 @@ def robot_for(robot: str | RobotSettings) -> RobotSettings:
     return ROBOTS[robot]
 
 
+def opposite_wheels(robot: RobotSettings) -> list[int]:
+    """Return the index of the wheel opposite to each wheel, or its own if it is in the middle.
+
+    Raises
+    ------
+    ValueError
+        If a wheel has none; one line.
+    """
+    places = [(wheel.x, wheel.y) for wheel in robot.wheels]
+    for name, (x, y) in zip(robot.wheel_names, places, strict=True):
+        if (x, -y) not in places:
+            raise ValueError(
+                f"learner.mirrored: wheel {name!r} of robot {robot.name or 'own'!r} has no wheel "
+                "opposite"
+            )
+    return [places.index((x, -y)) for x, y in places]
+
+
 def _check(robot: RobotSettings) -> None:
     """Refuse a robot with equal wheel names, wheels outside its body, or too few wheels."""
     name = f"robot {robot.name or 'own'!r}"
