@@ -297,11 +297,10 @@ class Spec(Settings):
         for change in changes:
             with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
-        if changes:
-            try:
-                _check_effects(changes, table.get(SWEEP))
-            except RecursionError:
-                raise SpecError(f"{title}: is nested too deeply") from None
+        try:
+            _check_effects(changes, table.get(SWEEP))
+        except RecursionError:
+            raise SpecError(f"{title}: is nested too deeply") from None
         return cls.of(table, sources)
 
     def conditions(self) -> tuple[Condition, ...]:
