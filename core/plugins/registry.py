@@ -39,8 +39,10 @@ MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
 
 
 @cache
-def _offered(entry_points: Callable[..., EntryPoints], group: str) -> tuple[EntryPoint, ...]:
-    """Return the entry points of a group; cached, because hundreds of packages are read."""
+def _offered(
+    entry_points: Callable[..., EntryPoints], group: str, folders: tuple[str, ...]
+) -> tuple[EntryPoint, ...]:
+    """Return the entry points of a group; cached by the folders of packages, which are many."""
     return tuple(entry_points(group=group))
 
 
@@ -91,7 +93,7 @@ class Registry:
         from importlib.metadata import entry_points
 
         places: dict[str, str] = {}
-        for point in _offered(entry_points, self.group):
+        for point in _offered(entry_points, self.group, tuple(sys.path)):
             known = self.built_in.get(point.name) or places.get(point.name)
             if known is not None and known != point.value:
                 raise ValueError(f"{point.name!r} is offered twice: {known}, {point.value}")
