@@ -101,8 +101,8 @@ class ComparisonTable(NamedTuple):
                 total = len(self.results.seeds(condition))
                 if missing := total - len(group.values[name]):
                     texts.append(f"{condition}, {missing} of {total}")
-        said = f"Seeds without success before the failure, left out: {'; '.join(texts)}."
-        return wrapped(said) if texts else []
+        text = f"Seeds without success before the failure, left out: {'; '.join(texts)}."
+        return wrapped(text) if texts else []
 
 
 def title_of(measure: Measure, phase: str) -> str:
