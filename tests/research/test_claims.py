@@ -270,6 +270,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "fit-ring-ppo",
         "equal-computing-boxes",
         "equal-computing-arms",
+        "equal-computing-arms-8",
         "edges-classes",
         "edges-hierarchies",
         "edges-arms",
