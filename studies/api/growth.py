@@ -107,7 +107,9 @@ def _method_remarks(study: StudyResults, results: Results, size: str | None) -> 
     changes = dict.fromkeys(f"{method} from {n:g} {axis.name}" for n, _, method in steps)
     if not changes:
         return ()
+    changing = dict.fromkeys(group for _, group, _ in steps)
+    head = "" if len(changing) == len({*groups}) else f"{', '.join(changing)}: "
     return (
-        f"The search method changes within the sizes ({', '.join(changes)}), so that one law "
+        f"{head}The search method changes within the sizes ({', '.join(changes)}), so that one law "
         "describes several methods; learner.decision.evaluator sets one for all.",
     )

@@ -28,7 +28,7 @@ from ..results.statistics import bootstrap, exactly, rate
 Policy: TypeAlias = Any
 """Policy: a function that returns the action for an observation, or for observations by agent; or a
 trained model with a method `predict` such as those of stable-baselines3, which is asked without
-exploration."""
+exploration. Its method ``begin(seed)``, if it has one, is called when a run begins."""
 
 
 class RandomPolicy:
@@ -197,8 +197,8 @@ def returns(
     wrap: Callable[..., Environment] = FaultyParallelEnv if is_parallel else FaultyEnv
     env = wrap(bare, faults, **wrapping)
     act = _function_of(policy)
-    if isinstance(policy, RandomPolicy):
-        policy.begin(seed)
+    if begin := getattr(policy, "begin", None):
+        begin(seed)
     totals = np.zeros(episodes)
     for episode, world in enumerate(np.random.SeedSequence(seed).generate_state(episodes)):
         observation, _ = env.reset(seed=int(world), options={"fault_episode": episode})

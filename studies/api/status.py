@@ -71,7 +71,8 @@ class Status:
             using = "with" if self.running else "if continued with"
             processes = count(self.processes, "process", "es")
             yield f"time     about {duration(self.seconds)} {using} {processes}"
-        yield from self.remarks
+        for remark in self.remarks:
+            yield f"\n{remark}"
 
 
 def progress(store: Store) -> Status:
@@ -93,8 +94,7 @@ def progress(store: Store) -> Status:
     processes = usual if now is None else now[0]
     spent = [(condition, seconds) for condition, _, seconds in running]
     other = None if store.is_older else other_spec(store)
-    remarks = [f"spec     {other}"] * bool(other)
-    remarks += [f"\nnothing can be added: {refusal}"] * bool(refusal)
+    remarks = list(filter(None, [other, refusal and f"nothing can be added: {refusal}"]))
     return Status(
         outline=StudyOutline.kept(store),
         total=len(trials),
@@ -104,7 +104,7 @@ def progress(store: Store) -> Status:
         running=tuple(running),
         processes=processes,
         seconds=_estimate(store.mean_seconds(), left, spent, processes),
-        remarks=(*remarks, *(f"\n{line}" for line in store.notes)),
+        remarks=(*remarks, *store.notes),
     )
 
 

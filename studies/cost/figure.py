@@ -117,9 +117,9 @@ def _draw_measured(counts: Axes, times: Axes, rows: Sequence[CostRow], looks: Lo
         known = [(r.agents, r.extra) for r in own if "decision_ms" in r.extra]
         if not known:
             continue
-        formula = [(n, log10(own["rule_evaluations_formula_per_step"])) for n, own in known]
-        counted = [(n, log10(own["rule_evaluations_per_step"])) for n, own in known]
-        timed = [(n, log10((own["decision_ms"] + own["learning_ms"]) / 1e3)) for n, own in known]
+        formula = [(n, log10(step["rule_evaluations_formula_per_step"])) for n, step in known]
+        counted = [(n, log10(step["rule_evaluations_per_step"])) for n, step in known]
+        timed = [(n, log10((step["decision_ms"] + step["learning_ms"]) / 1e3)) for n, step in known]
         shift = timed[-1][1] - formula[-1][1]
         _draw_line(counts, formula, counted, look)
         _draw_line(times, [(n, value + shift) for n, value in formula], timed, look)

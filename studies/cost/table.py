@@ -195,8 +195,9 @@ def cost_table(
         own = []
         for memberships, problem in each:
             row = replace(_row(text, n, problem), topology=label, memberships=memberships)
-            needs = joint_actions(text, n, problem.actions)
-            limited = {} if budget is None else within_budget(row, needs, budget)
+            limited: Columns = {}
+            if budget is not None:
+                limited = within_budget(row, joint_actions(text, n, problem.actions), budget)
             own.append(replace(row, extra=limited | extra))
         by_case.append(own)
     return CostTable(tuple(chain.from_iterable(zip(*by_case, strict=True))))

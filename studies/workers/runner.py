@@ -334,9 +334,8 @@ class Workers(ABC):
                     future.add_done_callback(finished.put)
                     continue
                 ended(running.pop(future).identity)
-                del (
-                    future
-                )  # otherwise Dask keeps the result and runs the trial again if the worker dies
+                # Otherwise Dask keeps the result and runs the trial again if the worker dies.
+                del future
                 left -= 1
                 submit_waiting()  # the worker continues while the outcome is stored
                 yield outcome

@@ -206,7 +206,7 @@ MAX_SHORT_DECISIONS = 1_000
 class ShortFirst(LokyWorkers):
     """Workers that start after this process itself has run short trials for a second.
 
-    A study of a few short trials needs no workers, whose start takes longer than its trials.
+    Starting workers takes longer than running a few short trials.
 
     Parameters
     ----------
@@ -240,5 +240,4 @@ def _is_short(trial: Trial) -> bool:
     """Return whether a trial takes well below a second and runs no user code."""
     if trial.sources.runs_foreign_code:
         return False
-    scenario, _ = trial.settings.arrange(trial.world())
-    return trial.max_steps * len(scenario.agents) <= MAX_SHORT_DECISIONS
+    return trial.max_steps * len(trial.world().agents) <= MAX_SHORT_DECISIONS

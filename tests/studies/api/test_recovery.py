@@ -63,6 +63,20 @@ def test_a_fault_that_ends() -> None:
     assert lines[-1].startswith(f"Levels are mean returns of {BLOCK} episodes; ")
 
 
+def test_a_policy_may_be_told_that_a_run_begins() -> None:
+    class Told(Pushing):
+        def __init__(self) -> None:
+            self.seeds: list[int] = []
+
+        def begin(self, seed: int) -> None:
+            self.seeds.append(seed)
+
+    told = Told()
+    schedules = {"reversed": [faults.Reversed(actuators=0, episode=BLOCK)]}
+    faults.recovery_table(make, {"told": told}, schedules, seeds=2, episodes=2 * BLOCK, steps=5)
+    assert set(told.seeds) == {0, 1}
+
+
 def test_agents_of_a_parallel_environment() -> None:
     def wheels() -> AgentsEnv:
         return parallel("box-pushing", 4, robots=1, action_repeat=2)
