@@ -196,15 +196,15 @@ class LokyWorkers(Workers):
         self._executor.shutdown(wait=True, kill_workers=True)
 
 
-HERE_S = 1.0
+HERE_S = 2.0
 """Processor time for which `ShortFirst` runs trials before it starts workers [s]."""
 
-MAX_SHORT_DECISIONS = 1_000
+MAX_SHORT_DECISIONS = 5_000
 """Maximum number of decisions of all agents in a short trial."""
 
 
 class ShortFirst(LokyWorkers):
-    """Workers that start after this process itself has run short trials for a second.
+    """Workers that start after this process itself has run short trials for two seconds.
 
     Starting workers takes longer than running a few short trials.
 

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from math import cos, pi, radians, sin
 
 import numpy as np
-from scipy.optimize import brentq
 
-from ....core.numerics import FloatArray, wrap
+from ....core.numerics import FloatArray, optimize, wrap
 from .boxes import BoxSpec
 from .geometry import distances, surface
 from .settings import RobotSettings
@@ -128,7 +127,7 @@ def approach(
     near = np.flatnonzero(gaps < gap)
     if not len(near):
         return origin
-    t = brentq(excess, steps[near[-1]], steps[near[-1] + 1], xtol=PRECISION)
+    t = optimize.brentq(excess, steps[near[-1]], steps[near[-1] + 1], xtol=PRECISION)
     return origin[0] + t * dx, origin[1] + t * dy
 
 
