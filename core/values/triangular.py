@@ -108,7 +108,10 @@ def _add_values(
     lowers = np.empty(d, np.int64)
     uppers = np.empty(d, np.int64)
     degrees = np.empty(d)
-    rules = np.empty(2 ** terms[:, LENGTH].max(), np.int64)
+    longest = 0
+    for t in range(len(terms)):  # `max` takes longer to compile
+        longest = max(longest, terms[t, LENGTH])
+    rules = np.empty(2**longest, np.int64)
     strengths = np.empty(len(rules))
     for s in range(len(out)):
         for j in range(d):

@@ -99,7 +99,8 @@ def _variations(robots: IntArray, plan: _Plan, alike: IntArray) -> IntArray:
     for r in robots:
         for a in range(alike.shape[1]):
             if alike[r, a] == a != plan.actions[r]:
-                actions[:, m] = plan.actions
+                for i in range(len(plan.actions)):  # a slice takes two seconds to compile
+                    actions[i, m] = plan.actions[i]
                 actions[r, m] = a
                 m += 1
     return actions[:, :m].copy()
@@ -112,7 +113,8 @@ def _store(
     """Store the values of robots' actions, given that of the plan and those of variations."""
     m = 0
     for r in robots:
-        plan.others[r] = plan.actions
+        for i in range(len(plan.actions)):
+            plan.others[r, i] = plan.actions[i]
         for a in range(alike.shape[1]):
             first = alike[r, a]
             if first == plan.actions[r]:
