@@ -25,7 +25,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 @pytest.mark.slow
 def test_decisions_of_every_size_are_timed(run: Run) -> None:
-    few = ["--preset", "own-value", "--robots", "2", "4", "5", "--number", "3"]
+    few = ["--robots", "2", "4", "5", "--number", "3"]
     said = run("benchmarks.decisions", *few)
     assert "time ~ n^" in said
     assert "with 8 to 10 agents (least)" in said

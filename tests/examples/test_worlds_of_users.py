@@ -53,14 +53,14 @@ def test_a_world_from_a_file(
     monkeypatch.chdir(tmp_path)
     for suffix in ("py", "toml"):
         shutil.copy(EXAMPLES / f"{name}.{suffix}", tmp_path)
-    short = ["--set", "seeds=3", "episodes=6", "steps=30", "evaluation=2", change]
+    short = ["--set", "seeds=2", "episodes=6", "steps=30", "evaluation=2", change]
     run = ["run", f"{name}.toml", *short, "--jobs", "1", "--out"]
     assert main([*run, "whole"]) == 0
     capsys.readouterr()
     assert main(["results", "whole", "--format", "csv"]) == 0
     header, *cells = capsys.readouterr().out.splitlines()
     assert measure in header.split(",")
-    assert len(cells) == 2 * 3 * 6
+    assert len(cells) == 2 * 2 * 6
 
     killed = command(*run, "killed", cwd=tmp_path)
     until = time.monotonic() + 120
