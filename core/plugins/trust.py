@@ -50,17 +50,23 @@ def is_trusted(text: str) -> bool:
     return False
 
 
-def trust(text: str) -> None:
-    """Add a text to the trusted list; if it cannot be written, only for this process."""
+def trust(text: str) -> bool:
+    """Add a text to the trusted list; return False if it is trusted in this process only.
+
+    This is so if the list cannot be written.
+    """
     if is_trusted(text):
-        return
+        return True
     digest = sha256(text)
     _noted.add(digest)
-    with contextlib.suppress(OSError, RuntimeError):
+    try:
         path = trusted_list()
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "a", encoding="ascii") as file:
             file.write(f"{digest}\n")
+    except (OSError, RuntimeError):
+        return False
+    return True
 
 
 def module_text(module: str) -> str:

@@ -93,8 +93,8 @@ def load_spec(path: Path, changes: Sequence[str], *, trust: bool, out: Path | No
 
 def _trust(texts: Mapping[str, str]) -> None:
     for title, text in texts.items():
-        say(f"{title} is trusted from now on")
-        trust_text(text)
+        lasting = trust_text(text)
+        say(f"{title} is trusted {'from now on' if lasting else 'in this run, but not later'}")
 
 
 def _named_by_copy(folder: Path) -> dict[str, str]:

@@ -89,7 +89,7 @@ def _broken_begins(x: Array, y: Array) -> list[Array]:
 
 
 def _power_of(a: float, b: float) -> str:
-    return f"{_digits(math.exp(a))} n^{_digits(b)}"
+    return f"{_digits(math.exp(a))} n^{_digits(round(b, 9) + 0.0)}"
 
 
 def _digits(value: float) -> str:

@@ -26,6 +26,7 @@ def power_text(
     smallest: float | None,
     measure: str = "",
     unit: str = "",
+    most: float = math.inf,
 ) -> list[str]:
     r"""Return lines on what paired seeds can tell, given the deviation of their differences.
 
@@ -41,6 +42,8 @@ def power_text(
         By what conditions are compared.
     unit
         Of differences, to be read after a number.
+    most
+        The greatest possible difference.
 
     Examples
     --------
@@ -71,10 +74,11 @@ def power_text(
             "deviate from them; more seeds show by how much."
         )
     else:
-        least = format_number(detectable(deviation, seeds, comparisons))
-        text = f"{detect} a difference of {least}{unit} with power {format_number(WANTED)}"
+        least = detectable(deviation, seeds, comparisons)
+        what = f"a difference of {format_number(least)}{unit}" if least < most else "no difference"
+        text = f"{detect} {what} with power {format_number(WANTED)}"
         text += f"{among}{within}."
-        if enough and goal != least:
+        if enough and goal != format_number(least):
             text += f" A difference of {goal} needs about {enough} seeds."
     return wrapped(f"Power: {text}")
 
@@ -100,7 +104,8 @@ def planned_text(
         else "how much those of single seeds deviate is not known before (--deviation)"
     )
     text = f"Differences of {what}, every condition with the first, p adjusted; {supposed}."
-    known = power_text(seeds, comparisons, deviation or 1.0, smallest, unit=unit)
+    most = 1.0 if of_rates else math.inf
+    known = power_text(seeds, comparisons, deviation or 1.0, smallest, unit=unit, most=most)
     return [*known, *wrap(text, WIDTH)]
 
 
@@ -121,7 +126,9 @@ def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool =
         return []
     deviation = deviation_of(samples, of_rates=of_rates)
     smallest = SMALLEST if of_rates else None
-    return power_text(min(map(len, samples)), len(samples), deviation, smallest, measure)
+    most = 1.0 if of_rates else math.inf
+    seeds = min(map(len, samples))
+    return power_text(seeds, len(samples), deviation, smallest, measure, most=most)
 
 
 def independent_power_lines(

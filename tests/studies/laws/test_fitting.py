@@ -252,6 +252,7 @@ def test_the_noise_of_rates_is_at_least_binomial() -> None:
 
 FORMULAS = {
     "power law": (curves.POWER, [np.log(5.0), 0.6], "5 n^0.6"),
+    "constant": (curves.POWER, [np.log(5.0), -1.6e-16], "5 n^0"),
     "pairs": (curves.QUADRATIC, [np.log(0.5), -40.0], "0.5 n (n - 1)"),
     "linear": (curves.QUADRATIC, [np.log(0.5), np.log(3.0)], "0.5 n (n + 2)"),
     "floor": (curves.FLOOR, [np.log(2.0), 1.5, np.log(7.0)], "7 + 2 n^1.5"),

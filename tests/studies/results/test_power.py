@@ -138,6 +138,12 @@ def test_without_deviation_nothing_is_promised() -> None:
     assert power_lines([]) == []
 
 
+def test_no_difference_of_rates_beyond_one_is_promised() -> None:
+    samples = [np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])]
+    assert "detect no difference with power" in power_lines(samples)[0]
+    assert "detect a difference of" in power_lines(samples, of_rates=False)[0]
+
+
 def test_a_difference_of_rounding_errors_is_none() -> None:
     assert compared([0.3, 0.1 + 0.2], [0.1 + 0.2, 0.3])[0].shown.startswith("0 [0, 0]")
 
