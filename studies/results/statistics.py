@@ -263,7 +263,7 @@ def stack_estimates(estimates: Sequence[Estimate]) -> Estimate:
 def welch(first: ArrayLike, second: ArrayLike) -> Estimate:
     """Return the difference of the means of two independent samples with Welch's interval.
 
-    Two constant samples differ exactly.
+    Two samples that are constant but for rounding errors differ exactly.
 
     Examples
     --------
@@ -272,11 +272,17 @@ def welch(first: ArrayLike, second: ArrayLike) -> Estimate:
     '3.00 [0.73, 5.27]'
     """
     own, base = np.sort(np.asarray(first, float)), np.sort(np.asarray(second, float))
+    rounding = ROUNDING * max(*np.abs(own), *np.abs(base))
     value = own.mean() - base.mean()
-    if np.ptp(own) == np.ptp(base) == 0.0:
+    value = np.where(np.abs(value) <= rounding, 0.0, value)
+    if max(np.ptp(own), np.ptp(base)) <= rounding:
         return Estimate(value, value, value)
-    low, high = stats.ttest_ind(own, base, equal_var=False).confidence_interval(0.95)
-    return Estimate(value, np.asarray(low), np.asarray(high))
+    # SciPy's `ttest_ind` warns of a loss of precision if one sample is constant.
+    shares = np.array([sample.var(ddof=1) / len(sample) for sample in (own, base)])
+    weights = [len(own) - 1, len(base) - 1]
+    freedom = shares.sum() ** 2 / (shares**2 / weights).sum()
+    half = stats.t.ppf(0.975, freedom) * np.sqrt(shares.sum())
+    return Estimate(value, value - half, value + half)
 
 
 def tied(own: Array, base: Array) -> list[Array]:

@@ -29,6 +29,7 @@ from nested_agents.studies.results.statistics import (
     rate,
     rates,
     resample_weights,
+    welch,
 )
 from research import RESULTS
 
@@ -198,6 +199,15 @@ def test_what_cannot_be_estimated_is_refused(values):
 def test_an_argument_out_of_range_is_named(function, values, options, named) -> None:
     with pytest.raises(ValueError, match=f"^{named}.*, allowed: "):
         function(values, **options)
+
+
+@pytest.mark.filterwarnings("error")
+def test_welchs_interval_is_that_of_scipy_and_rounding_errors_are_no_spread() -> None:
+    own, base = np.random.default_rng(0).normal(size=(2, 7))
+    expected = stats.ttest_ind(own, base[:4], equal_var=False).confidence_interval(0.95)
+    assert welch(own, base[:4])[1:] == pytest.approx(expected)
+    assert welch([1.0, 2.0, 3.0], [4.0] * 3) == pytest.approx([-2.0, -4.4841377, 0.4841377])
+    assert welch([0.3, 0.1 + 0.2], [0.1 + 0.2] * 2) == (0.0, 0.0, 0.0)
 
 
 def test_friedman_is_scipys_statistic_with_ties_and_without() -> None:
