@@ -8,6 +8,7 @@ on a smaller scale. A line ``# not tested: REASON`` at the top of a block exclud
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import runpy
@@ -105,6 +106,13 @@ def check_spec(name: str, text: str, folder: Path) -> None:
         check_conditions(spec)
 
 
+def check_changes(path: str, *options: str) -> None:
+    """Validate a spec with the changes of the option ``--set``."""
+    after = options[options.index("--set") + 1 :] if "--set" in options else ()
+    changes = [*itertools.takewhile(lambda word: not word.startswith("--"), after)]
+    Spec.load(path, changes)
+
+
 def smaller(arguments: list[str], page: str) -> list[str]:
     """Return the arguments of a command of a tutorial, such that a study is small."""
     if arguments[0] != "run":
@@ -148,6 +156,8 @@ def test_the_blocks_of_a_page(
         elif language in ("sh", "bash"):
             for words in commands(text):
                 arguments = check_command(words)
+                if arguments[:1] == ["run"] and Path(arguments[1]).is_file():
+                    check_changes(*arguments[1:])
                 is_run = language == "sh" and "tutorials/" in page  # bash: a script
                 if arguments and is_run and not any(part in " ".join(words) for part in NOT_RUN):
                     assert main(smaller(arguments, page)) == 0, words

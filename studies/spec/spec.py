@@ -294,10 +294,10 @@ class Spec(Settings):
             raise SpecError(f"{title}: is nested too deeply") from None
         if comment := first_sentence(text):
             table = {"title": comment, **table}
-        for change in changes:
-            with refused(f"--set {change}: "):
-                table = _changed(table, assignment(change))
         try:
+            for change in changes:
+                with refused(f"--set {change}: "):
+                    table = _changed(table, assignment(change))
             _check_effects(changes, table.get(SWEEP))
         except RecursionError:
             raise SpecError(f"{title}: is nested too deeply") from None
@@ -389,10 +389,16 @@ def _check_effects(changes: Sequence[str], sweep: object) -> None:
 
 
 def _changed(table: TomlTable, change: TomlTable) -> TomlTable:
-    """Return a changed table; a topology written as text becomes a table if a key of it changes."""
+    """Return a changed table; a topology written as text becomes a table if a key of it changes.
+
+    Keys of a sweep may be quoted or not: ``sweep."topology.kind"`` is ``sweep.topology.kind``.
+    """
     topology = table.get("topology")
     if isinstance(topology, str) and isinstance(change.get("topology"), Mapping):
         table = {**table, "topology": expand_section("topology", topology)}
+    swept, changed = table.get(SWEEP), change.get(SWEEP)
+    if isinstance(swept, Mapping) and isinstance(changed, Mapping):
+        return {**table, SWEEP: dict(flat(swept)) | dict(flat(changed))}
     return override(table, change)
 
 

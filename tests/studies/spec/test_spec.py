@@ -654,3 +654,12 @@ def test_a_team_too_large_for_a_worker_is_refused_by_an_estimate(scenario, estim
     with pytest.raises(SpecError, match=estimate + ".*" + allowed):
         Spec.of({"scenario": scenario})
     assert Spec.of({"scenario": {"robots": 512}})
+
+
+@pytest.mark.parametrize("key", ["scenario.robots", '"scenario.robots"', 'scenario."robots"'])
+@pytest.mark.parametrize("changed", ["scenario.robots", '"scenario.robots"'])
+def test_set_replaces_a_swept_key_however_it_is_quoted(key: str, changed: str) -> None:
+    text = f"sweep.{key} = [2, 4]\nsweep.topology.kind = ['chain', 'star']"
+    spec = Spec.parse(text, [f"sweep.{changed}=[8, 16]"])
+    assert list(spec.sweep["scenario.robots"]) == [8, 16]
+    assert len(spec.conditions()) == 4
