@@ -30,9 +30,9 @@ def test_the_rates_of_the_readme_are_published() -> None:
         format_number(edges.success(eight, phase).mean())
         for phase in ("evaluation:told only", "evaluation")
     )
-    assert f"eight robots succeed in {without} of the episodes instead of {chain}" in TEXT
+    assert f"success rate of eight robots falls from {chain} to {without} if lookahead" in TEXT
     sixteen = format_number(load("scaling").results.success("16", "evaluation").mean())
-    assert f"trained with 16 robots, they succeed in {sixteen} of the episodes" in TEXT
+    assert f"teams of 16 robots reach a success rate of {sixteen}." in TEXT
     results = (ROOT / "research" / "notebooks" / "box_pushing.md").read_text(encoding="utf-8")
     assert "or 0.62 [" in results
     assert "dynamics model from zero reach 0.97" in results
