@@ -144,15 +144,20 @@ def analyse_as(name: str, results: Results) -> Any:
     Raises
     ------
     SpecError
-        If the study is unknown, or trials lack numbers that it needs.
+        If the study is unknown, or the results lack episodes or numbers of trials that it needs.
     """
     study = load_study(name)
+    if results.conditions and not results.phases:
+        raise SpecError(
+            f"study = {name!r}: needs episodes, and this table holds only numbers of trials, "
+            "which compare reads with --measure"
+        )
     for needed in study.NUMBERS:
         for condition in results.conditions:
             if needed not in results.numbers(condition):
                 raise SpecError(
                     f"study = {name!r}: needs {needed} of every trial, which those of "
-                    f"{condition!r} have not measured"
+                    f"{condition!r} have not measured; allowed for episodes alone: learning-curve"
                 )
     analysis = study.analyse(results)
     same = identity_lines(results.identical)

@@ -183,7 +183,7 @@ def _group(
         if name in by_name:
             estimates |= _difference_columns(by_name[name], measure)
             count = _left_out(results, own, values[members[reference]], paired=by_name[name].paired)
-            left_out += [f"{reference} and {title}, {count}"] if count else []
+            left_out += [f"{count} of {reference} and {title}"] if count else []
         lines.append(Summary(title, len(own), estimates))
     return ComparisonGroup(
         setting=setting,

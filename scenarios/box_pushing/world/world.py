@@ -124,9 +124,9 @@ class World:
         self.place(np.stack([-around, 0 * around, 0 * around], axis=1), np.zeros(3))
 
     def set_grip(self, grip: FloatArray) -> None:
-        """Multiply the drive stiffness of every wheel by ``(n_wheels,)``; 0 lets a wheel run free.
+        """Set the factors ``(n_wheels,)`` of the wheels' drive stiffness, and rebuild the physics.
 
-        A free wheel still resists sideways motion. Holds until set again.
+        At 0 a wheel runs free; it still resists sideways motion.
         """
         self._grip: FloatArray = np.array(grip, dtype=float)
         if self._grip.shape != (self.n_wheels,) or not (self._grip >= 0).all():

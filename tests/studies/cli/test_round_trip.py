@@ -12,6 +12,7 @@ import pytest
 import nested_agents as na
 from nested_agents.studies import catalogue
 from nested_agents.studies.api.study import StudyResults
+from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.tables import tabulate
@@ -85,14 +86,23 @@ def test_exported_files_give_the_verdict_of_the_study(study: Path, form: str) ->
     assert verdict(read) == verdict(kept)
 
 
-def test_exported_trials_give_the_verdict_of_the_study(study: Path, tmp_path: Path) -> None:
+def test_exported_trials_give_the_verdict_of_the_study(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["export", str(study), "--out", str(tmp_path)]) == 0
-    expected = na.load(study).compare(measure="seconds.total")
+    kept = na.load(study)
+    expected = kept.compare(measure="seconds.total")
     comparison = na.load(tmp_path / "trials.csv").compare(measure="seconds.total")
     assert comparison.analysis.notes == expected.analysis.notes
     assert "2 of" in comparison.remarks[0]
     with pytest.raises(SpecError, match=r"measure = 'success': known: .*seconds\.total"):
         na.load(tmp_path / "trials.csv").compare(measure="success")
+    assert main(["table", str(tmp_path / "trials.csv")]) == 2
+    assert "needs episodes" in capsys.readouterr().err
+    numbers = load_study(kept.outline.study).NUMBERS
+    assert main(["table", str(tmp_path / "episodes.csv")]) == (2 if numbers else 0)
+    assert ("learning-curve" in capsys.readouterr().err) == bool(numbers)
+    assert main(["table", str(tmp_path / "episodes.csv"), "--as", "learning-curve"]) == 0
 
 
 def test_the_order_of_rows_and_columns_does_not_matter(study: Path, tmp_path: Path) -> None:
