@@ -11,7 +11,7 @@ from .arrays import (
     wrap,
     wrap_one,
 )
-from .compiler import INNER, LOCK, Kernel, njit, serve, stamp, working_seconds
+from .compiler import INNER, LOCK, Kernel, compile_ahead, njit, serve, stamp, working_seconds
 from .libraries import Deferred, nx, optimize, pd, special, stats
 from .random import set_words, stream_of, words_of
 
@@ -25,6 +25,7 @@ __all__ = [
     "FloatArray",
     "IntArray",
     "Kernel",
+    "compile_ahead",
     "greatest",
     "njit",
     "nx",

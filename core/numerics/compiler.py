@@ -10,7 +10,8 @@ The lock is held while code is read or written, but not during compilation.
 
 A separate process compiles kernels, and the calling process loads them from the cache. A process
 that compiled kernels itself would hold several versions of inner kernels with different rounding,
-so that the first run would differ from later runs in the last bits.
+so that the first run would differ from later runs in the last bits. Kernels that take long and will
+surely be called are compiled ahead, each by a process of its own, so that two cores are in use.
 
 numba considers a cached kernel valid if the kernel's own file has not changed. Kernels also depend
 on inner kernels and constants of other modules, so that here all imported files count as well.
@@ -47,7 +48,10 @@ IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 """Relative import, the only kind of import within the package."""
 
 LOCK = "compiling.lock"
-"""Lock file in the cache folder that a process holds while it compiles."""
+"""End of the names of lock files in the cache folder: a process holds one while it compiles."""
+
+CANNOT_ASK = OSError, pickle.PicklingError, AttributeError, TypeError
+"""Errors after which this process compiles a kernel itself."""
 
 INNER = "-inner"
 """Suffix of the names of cached kernels that only kernels call."""
@@ -88,6 +92,8 @@ class Kernel:
         self.py_func = function
         self._options = {"error_model": "numpy", **options}
         self._ready: Function | None = None
+        self._is_asked = False
+        self._ahead: subprocess.Popen[bytes] | None = None
 
     # Unused wrappers are not compiled; they take up to half of the time for a small kernel.
 
@@ -158,30 +164,53 @@ class Kernel:
                 _preparation["seconds"] += perf_counter() - begin
         return self._ready(*args)
 
+    def ahead(self, *args: object) -> None:
+        """Begin to compile for the types of some arguments, unless the cache has such a version.
+
+        A later call waits for this.
+        """
+        if self._is_asked or os.cpu_count() == 1:
+            return
+        self._is_asked = True
+        types = tuple(map(self.compiled.typeof_pyval, args))
+        if _cache_file(self.compiled) is not None and not _is_cached(self.compiled, types):
+            with contextlib.suppress(*CANNOT_ASK):
+                child = _start_child()
+                self._ahead = child
+                self._ask(child, types)
+                _pipe(child.stdin).close()
+
     def _prepared(self, args: tuple[object, ...]) -> Function:
         """Return the function, compiled or loaded for the types of some arguments."""
         compiled = self.compiled
         file = _cache_file(compiled)
         if file is None:
             return cast(Function, compiled)
-        from .kernel_cache import lock_beside
-
+        if self._ahead is not None:
+            self._ahead.wait()
         types = tuple(map(compiled.typeof_pyval, args))
         if not _is_cached(compiled, types):
-            with lock_beside(file, LOCK):
-                self._compile_apart(compiled, types)
+            with contextlib.suppress(*CANNOT_ASK):
+                child = _child(os.getpid())
+                self._ask(child, types)
+                _pipe(child.stdout).read(1)
         compiled.compile(types)
         return cast(Function, compiled)
 
-    def _compile_apart(self, compiled: Dispatcher, types: tuple[object, ...]) -> None:
-        """Compile the function for argument types in the child process, if possible."""
-        if not _is_cached(compiled, types):  # by the previous holder of the lock
-            with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
-                requests, answers = _child(os.getpid())
-                place = self.py_func.__module__, self.py_func.__name__
-                pickle.dump((sys.path, *place, pickle.dumps(types)), requests)
-                requests.flush()
-                answers.read(1)
+    def _ask(self, child: subprocess.Popen[bytes], types: tuple[object, ...]) -> None:
+        """Ask a child process to compile the function for some types."""
+        place = self.py_func.__module__, self.py_func.__name__
+        requests = _pipe(child.stdin)
+        pickle.dump((sys.path, *place, pickle.dumps(types)), requests)
+        requests.flush()
+
+    def compile_once(self, types: tuple[object, ...]) -> None:
+        """Compile the function for some types, or wait while another process does so."""
+        from .kernel_cache import lock_beside
+
+        with lock_beside(_cache_file(self.compiled), f"{self.py_func.__name__}-{LOCK}"):
+            if not _is_cached(self.compiled, types):
+                self.compiled.compile(types)
 
 
 def _temporary_folder() -> str:
@@ -198,11 +227,19 @@ def _temporary_folder() -> str:
 
 
 @cache
-def _child(parent: int) -> tuple[IO[bytes], IO[bytes]]:
-    """Start the compiling process; return its standard input and output.
+def _child(parent: int) -> subprocess.Popen[bytes]:
+    """Return the process that compiles kernels when they are first called."""
+    return _start_child()
 
-    It ends with the process that started it.
-    """
+
+def _pipe(stream: IO[bytes] | None) -> IO[bytes]:
+    """Return the standard input or output of a child process."""
+    assert stream is not None
+    return stream
+
+
+def _start_child() -> subprocess.Popen[bytes]:
+    """Start a process that compiles what its standard input requests, and ends with this one."""
     child = subprocess.Popen(
         python_command(f"from {__name__} import serve; serve()"),
         stdin=subprocess.PIPE,
@@ -210,10 +247,8 @@ def _child(parent: int) -> tuple[IO[bytes], IO[bytes]]:
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    atexit.register(child.__exit__, None, None, None)
-    assert child.stdin is not None  # a pipe
-    assert child.stdout is not None
-    return child.stdin, child.stdout
+    atexit.register(child.kill)
+    return child
 
 
 def serve() -> None:
@@ -229,7 +264,7 @@ def serve() -> None:
         gc.disable()  # collecting garbage takes a tenth of the time
         with contextlib.suppress(Exception):
             kernel = vars(importlib.import_module(module))[name]
-            kernel.compiled.compile(pickle.loads(types))
+            kernel.compile_once(pickle.loads(types))
         gc.enable()
         sys.stdout.buffer.write(b".")
         sys.stdout.buffer.flush()
@@ -242,6 +277,12 @@ def njit(*, names_of: str = "", **options: object) -> Callable[[F], F]:
         return cast(F, Kernel(function, options, names_of))
 
     return decorate
+
+
+def compile_ahead(kernel: Function, *args: object) -> None:
+    """Begin to compile a kernel for the types of some arguments, see `Kernel.ahead`."""
+    if isinstance(kernel, Kernel):
+        kernel.ahead(*args)
 
 
 def _names(code: CodeType) -> Iterator[str]:

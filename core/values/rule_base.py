@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import Field
 
 from ..interface.spaces import StateSpace
-from ..numerics import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray, compile_ahead
 from ..plugins.settings import Positive, Settings
 from ..plugins.words import closest
 from .partitions import Partition
@@ -236,6 +236,16 @@ class RuleBase:
         body = np.repeat(np.arange(len(shared)), np.diff(firsts))
         states = np.concatenate([own[agents], shared[body]], axis=2)
         return self.values_of_agents(weights[0], states).sum(axis=0)
+
+    def prepare_kernels(self) -> None:
+        """Begin to compile `summed_values`, if it is not cached yet."""
+        if self.is_triangular:
+            some = np.zeros((1, 1))
+            none = np.zeros(1, np.int64)
+            weights = some, some, some
+            terms, variables = self.terms_by_owner, self.layout[0]
+            own = some[None]
+            compile_ahead(summed_values, weights, none, none, terms, own, own, variables)
 
     def squared_lengths(self, states: FloatArray) -> FloatArray:
         """Return the squared lengths ``(m,)`` of the feature vectors of states ``(m, d)``.

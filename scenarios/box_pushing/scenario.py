@@ -27,7 +27,7 @@ from .config import BoxPushingSettings
 from .measurements import MEASURES, ORIENTATION
 from .prediction.calibration import CONSTANTS, PushBelief, measured_twists
 from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
-from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
+from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState, prepare_kernels
 from .prediction.predictors import ExactPrediction, push_model
 from .prediction.settings import BeliefSettings
 from .states.kernel import progress_of
@@ -123,6 +123,7 @@ class BoxPushing(Scenario):
         )
         self._prediction = self._shared_settings()
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
+        prepare_kernels(self._model, self.space)
         # Robots that do not fit around the box are refused now, not in the middle of a study.
         BoxPushing.reset(self, 0)
 

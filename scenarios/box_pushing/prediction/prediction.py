@@ -13,10 +13,10 @@ import numpy as np
 
 from ....core.interface.prediction import Assumptions, EmbodiedPrediction
 from ....core.interface.spaces import ActionSet
-from ....core.numerics import FloatArray, IntArray
+from ....core.numerics import FloatArray, IntArray, compile_ahead
 from ....core.search.best_response import RespondingPrediction, Responses, Search
 from ....core.values.rule_base import RuleBase
-from ..states.kernel import progress_of
+from ..states.kernel import evaluate, progress_of
 from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
 from ..world.reward import Task, reward
@@ -73,6 +73,15 @@ class PredictionSettings:
     """Decision period [s]."""
     horizon: float
     """Prediction horizon [s]."""
+
+
+def prepare_kernels(model: PushModel, space: BoxStateSpace) -> None:
+    """Begin to compile the kernels of predictions that take longest, if they are not cached."""
+    pose, poses = np.zeros(3), np.zeros((3, 1))
+    actions = np.zeros((1, 1), np.int64)
+    batch = SituationBatch(poses[None], poses, poses[:1], pose, poses, 1.0, model.shape)
+    compile_ahead(evaluate, batch, actions[0], space.columns)
+    compile_ahead(push, poses.T.copy(), pose, pose[None, None], actions, 1.0, model)
 
 
 class BoxPrediction(EmbodiedPrediction, RespondingPrediction):

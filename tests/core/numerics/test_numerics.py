@@ -113,7 +113,7 @@ def test_who_takes_a_kernel_from_the_cache_waits_for_no_compilation(
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     assert called(package) == (6, 1, True)
-    held = [path.open("w") for path in package.rglob(LOCK)]
+    held = [path.open("w") for path in package.rglob(f"*{LOCK}")]
     assert held
     for file in held:
         locks.lock(file)
@@ -138,6 +138,31 @@ def test_kernels_for_several_types_are_compiled_at_once(
     assert [process.communicate()[0].strip() for process in begun] == [*values.values()]
     from_cache = asking(*values).communicate()[0]
     assert from_cache.split() == [*values.values()]
+
+
+def test_a_kernel_that_is_compiled_ahead_is_loaded_by_its_call(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    code = (
+        "import os; os.cpu_count = lambda: {cores}\n"
+        "from nested_agents.core.numerics import compile_ahead, compiler\n"
+        "from package.caller import caller\n"
+        "started, start = [], compiler._start_child\n"
+        "compiler._start_child = lambda: started.append(start()) or started[-1]\n"
+        "compile_ahead(caller, 2)\n"
+        "compile_ahead(caller, 2)\n"
+        "print(len(started), caller(3), len(started), caller.compiled.stats.cache_hits.total())"
+    )
+
+    def asking(cores: int) -> str:
+        command = [sys.executable, "-c", code.format(cores=cores)]
+        return subprocess.check_output(command, cwd=package.parent, text=True).strip()
+
+    assert asking(2) == "1 6 1 1"
+    assert asking(2) == "0 6 0 1"  # from the cache
+    (package / "constants.py").write_text("FACTOR = 4\n")
+    assert asking(1) == "0 12 1 1"  # not ahead on a single core
 
 
 def test_the_clock_of_durations_stops_during_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
