@@ -24,7 +24,7 @@ from ..results.differences import (
 from ..results.notation import format_estimate, format_number
 from ..results.permutation_tests import LEVEL
 from ..results.results import row_means
-from ..results.statistics import Estimate
+from ..results.statistics import Estimate, differ_equally
 from .losses import Position, positions
 
 HALF = 0.5
@@ -172,7 +172,7 @@ class Resilience:
         }
         return tuple(
             d
-            if not d.paired or np.ptp(d.sample) > 0.0
+            if not d.paired or not differ_equally(*d.values)
             else replace(
                 d, estimate=difference_of_estimates(changes[first.condition], changes[d.condition])
             )

@@ -16,6 +16,7 @@ from .statistics import (
     Estimate,
     bootstrap,
     cliffs_delta,
+    differ_equally,
     exactly,
     probability_higher,
     rate,
@@ -180,7 +181,7 @@ def paired_difference(own: Array, base: Array, measure: Measure) -> Estimate:
     equally for every seed are treated as independent, because their bootstrap interval has no
     width.
     """
-    if measure.is_rate and np.ptp(own - base) == 0.0:
+    if measure.is_rate and differ_equally(own, base):
         return difference(own[:, None], base[:, None])
     least, greatest = measure.bounds
     return bootstrap(own - base, bounds=(least - greatest, greatest - least))

@@ -285,6 +285,18 @@ def welch(first: ArrayLike, second: ArrayLike) -> Estimate:
     return Estimate(value, value - half, value + half)
 
 
+def differ_equally(own: Array, base: Array) -> bool:
+    """Return whether all differences of paired values are equal, except for rounding.
+
+    Examples
+    --------
+    >>> differ_equally(np.array([0.3, 0.6]), np.array([0.1, 0.4]))
+    True
+    """
+    largest = max(float(abs(values).max()) for values in (own, base))
+    return bool(np.ptp(own - base) <= ROUNDING * largest)
+
+
 def tied(own: Array, base: Array) -> list[Array]:
     """Return the ranks of the values of two samples, equal if values differ by rounding only.
 

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...core.interface.measures import Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
@@ -17,9 +17,9 @@ from ..laws.scaling import decisions_to_criterion
 from ..laws.size_axis import SizeAxis
 from ..laws.universal import Scaling
 from ..results.analysis import estimate_of, mean_estimate
-from ..results.comparison import title_of, values_of
+from ..results.comparison import title_of, values_by_seed, values_of
 from ..results.differences import BySeed
-from ..results.results import Results
+from ..results.results import Results, row_means
 from ..results.statistics import Array, Estimate
 
 ALL_TEAMS = "all teams"
@@ -63,8 +63,8 @@ class ScalabilityData:
     performance_estimates: Mapping[Place, Estimate]
     """Means with the intervals of the study's table."""
     times: Cells
-    """Decisions of an episode; failed episodes count with the longest that is allowed. Missing
-    where all episodes failed."""
+    """Decisions of an episode; failed episodes count with the longest that is allowed, also if they
+    ended early. Missing where all episodes failed."""
     costs: Mapping[str, Cells]
     """By the name of the cost, see `HEADINGS`."""
     has_criterion: bool = False
@@ -167,9 +167,7 @@ def collect(
             costs[cost] = _cells(values_of(results, number)[1], places)
     times: Cells = {}
     with suppress(SpecError):  # was not measured
-        steps, lengths, _ = values_of(results, TIME, phase or None)
-        limit = steps.bounds[1]  # where every episode reached it, nothing is known of the time
-        times = {p: own for p, own in _cells(lengths, places).items() if own.min() < limit}
+        times = _cells(_times(results, phase), places)
     if criterion is not None:
         reached = decisions_to_criterion(results, measure, criterion)
         counts = {c: own for c, (own, censored) in reached.items() if not censored.any()}
@@ -190,6 +188,20 @@ def collect(
         costs=costs,
         has_criterion=criterion is not None,
     )
+
+
+def _times(results: Results, phase: str) -> dict[str, BySeed]:
+    """Return the times of conditions by seed, see `ScalabilityData.times`."""
+    steps, lengths, phase = values_by_seed(results, TIME, phase or None)
+    limit = steps.bounds[1]
+    times = {}
+    for condition, own in lengths.items():
+        if SUCCESS in results.measures and results.has(condition, phase, SUCCESS.name):
+            own = own.where(results.by_seed(condition, phase) > 0.0, limit)
+        mean = row_means(own)
+        if mean.min() < limit and mean.max() < np.inf:  # else nothing is known of the time
+            times[condition] = mean
+    return times
 
 
 def _cells(values: Mapping[str, BySeed], places: Mapping[str, Place]) -> Cells:

@@ -41,12 +41,17 @@ def non_dominated(performance: Array, cost: Array) -> BoolArray:
     >>> non_dominated(np.array([0.9, 0.8, 0.95]), np.array([10.0, 20.0, 30.0])).tolist()
     [True, False, True]
     """
-    better = performance[..., None, :] >= performance[..., :, None]
-    cheaper = cost[..., None, :] <= cost[..., :, None]
-    strictly = (performance[..., None, :] > performance[..., :, None]) | (
-        cost[..., None, :] < cost[..., :, None]
-    )
-    return np.logical_not(np.any(better & cheaper & strictly, axis=-1))
+    better = _at_least(performance[..., None, :], performance[..., :, None])
+    worse = _at_least(performance[..., :, None], performance[..., None, :])
+    cheaper = _at_least(cost[..., :, None], cost[..., None, :])
+    dearer = _at_least(cost[..., None, :], cost[..., :, None])
+    return np.logical_not(np.any(better & cheaper & ~(worse & dearer), axis=-1))
+
+
+def _at_least(values: Array, others: Array) -> BoolArray:
+    """Return which values are not below others; those that differ by rounding only tie."""
+    ties: BoolArray = values >= others - ROUNDING * np.abs(others)
+    return ties
 
 
 def pareto_points(data: ScalabilityData) -> pd.DataFrame:
@@ -155,9 +160,7 @@ def _best(
 
 def are_greatest(means: Array) -> BoolArray:
     """Return which means ``(..., n)`` are the greatest; those that differ by rounding only tie."""
-    greatest = means.max(axis=-1, keepdims=True)
-    ties: BoolArray = means >= greatest - ROUNDING * np.abs(greatest)
-    return ties
+    return _at_least(means, means.max(axis=-1, keepdims=True))
 
 
 def _shares_of_greatest(means: Array) -> Array:

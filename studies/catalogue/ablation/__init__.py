@@ -33,13 +33,15 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
         means = {name: results.means(c, phase, main.name) for name, c in conditions.items()}
         pairs[title] = [(name, title, own, means[names[0]]) for name, own in means.items()][1:]
     compared, notes = judged(pairs, "".join(names[:1]), main)
-    by_place = {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
+    by_place = {(first, title): exactly(0.0) for first in names[:1] for title in phases}
+    by_place |= {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
     table = []
     for name, condition in conditions.items():
         estimates = {}
         for title, phase in phases.items():
             estimates[title] = estimate_of(results, condition, phase, main)
-            estimates[f"{title}, difference"] = by_place.get((name, title), exactly(0.0))
+            if (name, title) in by_place:
+                estimates[f"{title}, difference"] = by_place[name, title]
         table.append(Summary(name, len(results.seeds(condition)), estimates))
     return Analysis(tuple(table), tuple(notes), differences=compared)
 

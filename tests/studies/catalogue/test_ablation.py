@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 from made_up_results import NOTHING, ablation
@@ -21,6 +22,18 @@ def test_what_matters_is_named_and_what_does_not_is_not() -> None:
     by_name = {line.condition: line.estimates for line in analysis.table}
     assert by_name["default"]["evaluation success, difference"].value == 0.0
     assert by_name["no replay"]["evaluation success, difference"].high < -0.4
+
+
+def test_a_condition_without_two_seeds_in_common_has_no_difference() -> None:
+    results = ablation(CHANCES).frames()
+    is_kept = (results.trials["condition"] != "no replay") | (results.trials["seed"] == 0)
+    first = (results.episodes["condition"] != "no replay") | (results.episodes["seed"] == 0)
+    part = replace(results, trials=results.trials[is_kept], episodes=results.episodes[first])
+    by_name = {line.condition: line.estimates for line in analyse(part).table}
+    titles = {title for title in by_name["more of it"] if title.endswith("difference")}
+    assert len(titles) == 2
+    assert titles <= by_name["default"].keys()
+    assert not titles & by_name["no replay"].keys()
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:

@@ -72,6 +72,13 @@ def lengths(steps: list[list[int]], limits: StepLimits) -> Results:
     return replace(results, step_limits=limits)
 
 
+@pytest.mark.parametrize("base", [[0.1, 0.4, 0.7], [1 / 3, 0.0, 2 / 3], [0.5, 0.25, 0.0]])
+def test_rates_that_differ_equally_except_for_rounding_have_a_wide_interval(base):
+    own = np.array(base) + 0.2
+    estimate = paired_difference(own, np.array(base), SUCCESS)
+    assert estimate.low < 0.0 < estimate.value < estimate.high - 0.2
+
+
 def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
     """Of 150, 150 and 100 steps Student's interval would reach from 62 to 205."""
     results = lengths([[150], [150], [100]], (450, 150))

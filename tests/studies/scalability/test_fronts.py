@@ -47,6 +47,12 @@ def test_a_point_is_beaten_only_if_another_is_no_worse_in_both_and_better_in_one
     assert non_dominated(performance, cost).tolist() == [True, True, True, False, True]
 
 
+def test_means_that_differ_by_rounding_tie():
+    performance = np.array([0.1 + 0.2, 0.3])
+    assert non_dominated(performance, np.array([2.0, 1.0])).tolist() == [False, True]
+    assert non_dominated(performance, np.array([1.0, 1.0])).tolist() == [True, True]
+
+
 def test_the_front_of_every_size(data):
     on_front = {(p.size, p.hierarchy) for p in pareto_points(data).itertuples() if p.on_front}
     assert on_front == {(2.0, "chain"), (2.0, "tree"), (2.0, "none"), (4.0, "tree"), (4.0, "none")}

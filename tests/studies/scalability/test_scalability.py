@@ -44,8 +44,13 @@ def test_speed_up_and_law_of_published_results():
     assert analysis.data.scaling == "weak"  # boxes grow with the number of robots
     assert analysis.data.all_sizes == (2.0, 4.0, 8.0, 16.0)
     (own,) = analysis.speedups.values()
-    steps = na.load(SCALING).results
-    two, sixteen = (steps.means(size, "evaluation", "steps").mean() for size in ("2", "16"))
+    results = na.load(SCALING).results
+    two, sixteen = (
+        np.where(
+            results.success(size, "evaluation"), results.values(size, "steps", "evaluation"), 450
+        ).mean()
+        for size in ("2", "16")
+    )
     assert own[16.0]["efficiency"].value == pytest.approx(two / sixteen)
     assert set(analysis.data.costs) == {"decision_ms", "messages", "joint_actions", "compute_s"}
 
@@ -62,7 +67,7 @@ def test_the_performance_is_that_of_the_table():
 
 def test_controls_that_never_succeed_have_no_speed_up():
     analysis = na.load(RESULTS / "controls.json").scalability()
-    assert set(analysis.speedups) == {"planner"}
+    assert not analysis.speedups  # planners never succeed with 16 robots
 
 
 def test_arms_have_the_same_task_for_all_sizes():
