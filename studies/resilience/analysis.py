@@ -8,8 +8,6 @@ from functools import cached_property
 from itertools import groupby
 from math import comb
 
-import numpy as np
-
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.interface.measures import Measure
 from ...core.numerics import pd

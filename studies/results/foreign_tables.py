@@ -237,12 +237,13 @@ def _at_last_step(
     notes = []
     for name in measures:
         known = keys.assign(measure=name, value=scores[name]).dropna()
-        for _, own in known.groupby("phase"):
+        for phase, own in known.groupby("phase"):
             rows, note = at_last_step(own, step_name)
             if rows.empty:
                 raise SpecError(f"{name}: {note}")
             kept.append(rows)
-            notes.append((name, note))
+            is_only = scores["phase"].nunique() == 1
+            notes.append((name if is_only else f"{name}, {phase}", note))
     whole = pd.concat(kept).pivot(index=KEYS, columns="measure", values="value").reset_index()
     return whole, joined_notes(notes)
 

@@ -104,7 +104,7 @@ def test_runs_of_other_names_are_independent_samples_of_common_items(scores) -> 
     assert not ring.paired
     assert not star.paired
     assert float(ring.estimate.value) == pytest.approx(own - base)
-    assert "chain and ring, 8 of 56 scores" in " ".join(str(compared).split())
+    assert "8 of 56 scores of chain and ring" in " ".join(str(compared).split())
 
 
 def test_columns_of_conditions_are_crossed(scores) -> None:
@@ -130,7 +130,7 @@ def test_scores_are_paired_by_seed_and_item(scores) -> None:
     comparison = na.compare_table(fewer, score="tokens", **ROLES)
     assert [float(d.estimate.value) for d in comparison.differences] == pytest.approx([6.0, 3.0])
     said = " ".join(" ".join(comparison.notes).split())
-    assert "chain and ring, 2 of 62 scores; chain and star, 1 of 63 scores" in said
+    assert "2 of 62 scores of chain and ring; 1 of 63 scores of chain and star" in said
     killed = scores[(scores["topology"] != "star") | (scores["run"] > 0)]
     comparison = na.compare_table(killed, score="tokens", **ROLES)
     assert [d.seeds for d in comparison.differences] == [8, 7]
@@ -387,3 +387,17 @@ def test_small_scores_are_shown_and_tiny_ones_refused(tmp_path: Path, capsys) ->
     assert "b, +5.0e-5 [+5.0e-5, +5.0e-5]" in out
     assert compare(1e-9) == 2
     assert "measure = 'score': the largest value is 1.3e-08" in capsys.readouterr().err
+
+
+def test_a_note_on_the_last_step_names_its_phase_if_there_are_several() -> None:
+    rows = [
+        (condition, seed, phase, step, step + seed)
+        for condition in "ab"
+        for seed in range(3)
+        for phase, last in (("train", 3), ("test", 2))
+        for step in range(last + 1)
+    ]
+    frame = pd.DataFrame(rows, columns=["condition", "seed", "phase", "step", "score"])
+    notes = na.compare_table(frame, phase="test").notes
+    assert any("test" in note and "step 2" in note for note in notes)
+    assert any("train" in note and "step 3" in note for note in notes)

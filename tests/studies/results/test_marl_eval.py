@@ -104,7 +104,7 @@ def test_runs_are_paired_by_name(tmp_path: Path) -> None:
     comparison = compare(tmp_path, runs)
     (found,) = comparison.differences
     assert (found.seeds, found.sample.tolist()) == (9, pytest.approx([0.5] * 9))
-    assert "B, 1 of 19 runs" in " ".join(comparison.notes)
+    assert "1 of 19 runs of A and B" in " ".join(comparison.notes)
 
 
 @pytest.mark.parametrize("name", ["condition", "phase", "seed", "episode"])
