@@ -53,6 +53,15 @@ def test_differences_are_those_that_compare_prints() -> None:
     assert (star.shown, star.seeds) == (same.shown, same.seeds)
 
 
+def test_a_setting_without_the_reference_is_named() -> None:
+    known = {key: chance for key, chance in CHANCES.items() if key != ("chain", "team", 8)}
+    analysis = analyse(hierarchies(known).frames())
+    assert "8 robots, team" not in analysis.differences
+    (said,) = [line for line in analysis.notes if line.startswith("Not compared")]
+    assert "chain" in said
+    assert "8 robots, team" in said
+
+
 def test_with_few_seeds_nothing_can_be_told() -> None:
     analysis = analyse(hierarchies(CHANCES, seeds=5).frames())
     text = "\n".join(analysis.notes)
