@@ -9,10 +9,7 @@ conditions, ``[evaluations]`` further scenarios and hierarchies for the trained 
 
 from __future__ import annotations
 
-import itertools
 import math
-import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -43,7 +40,7 @@ from .resolution import (
     sections_of,
 )
 from .studies import STUDIES
-from .tables import SWEEP, SpecTable, TomlTable, assignment, flat, override, spec_text
+from .tables import SWEEP, SpecTable, TomlTable, assignment, flat, override, spec_text, table_of
 
 MOST_TRIALS = 100_000
 """Maximum number of trials of a study."""
@@ -287,14 +284,7 @@ class Spec(Settings):
         Messages call the text by its `title`.
         """
         try:
-            table = tomllib.loads(text)
-        except ValueError as error:  # also of a number of too many digits
-            raise SpecError(f"{title}: is not valid TOML: {error}") from None
-        except RecursionError:
-            raise SpecError(f"{title}: is nested too deeply") from None
-        if comment := first_sentence(text):
-            table = {"title": comment, **table}
-        try:
+            table = table_of(text, title)
             for change in changes:
                 with refused(f"--set {change}: "):
                     table = _changed(table, assignment(change))
@@ -364,17 +354,6 @@ class Spec(Settings):
         if not self.keep_teams:
             del table["keep_teams"]
         return {key: value for key, value in table.items() if value not in ([], ())}
-
-
-def first_sentence(text: str) -> str:
-    r"""Return the first sentence of the comment at the top of a TOML text; empty without one.
-
-    >>> first_sentence("# Do two robots learn? See Fig. 5.\nstudy = 'scaling'")
-    'Do two robots learn?'
-    """
-    lines = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
-    comment = " ".join(line[1:].strip() for line in lines if not line.startswith("#:"))
-    return re.split(r"(?<=[?!])\s|[.:](?:\s|$)", comment, maxsplit=1)[0].strip()
 
 
 def _check_effects(changes: Sequence[str], sweep: object) -> None:

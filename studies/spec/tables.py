@@ -5,6 +5,8 @@ sweeps.
 """
 
 import hashlib
+import itertools
+import re
 import tomllib
 import typing
 from collections.abc import Collection, Iterator, Mapping
@@ -265,3 +267,30 @@ def spec_text(path: Path) -> str:
         raise SpecError(f"{path}: {error.strerror or error}{hint}") from None
     except UnicodeDecodeError:
         raise SpecError(f"{path}: is not UTF-8 text") from None
+
+
+def table_of(text: str, source: str) -> TomlTable:
+    """Return the table of a TOML text; the comment at its top becomes the title.
+
+    Raises
+    ------
+    SpecError
+        If the text, which comes from `source`, is no TOML.
+    """
+    try:
+        table = tomllib.loads(text)
+    except ValueError as error:  # also of a number of too many digits
+        raise SpecError(f"{source}: is not valid TOML: {error}") from None
+    comment = first_sentence(text)
+    return {"title": comment, **table} if comment else table
+
+
+def first_sentence(text: str) -> str:
+    r"""Return the first sentence of the comment at the top of a TOML text; empty without one.
+
+    >>> first_sentence("# Do two robots learn? See Fig. 5.\nstudy = 'scaling'")
+    'Do two robots learn?'
+    """
+    lines = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    comment = " ".join(line[1:].strip() for line in lines if not line.startswith("#:"))
+    return re.split(r"(?<=[?!])\s|[.:](?:\s|$)", comment, maxsplit=1)[0].strip()
