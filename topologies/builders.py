@@ -173,7 +173,7 @@ def independent(agents: Names, bodies: Bodies = ()) -> nx.DiGraph:
 
 
 def simultaneous(agents: Names, bodies: Bodies = ()) -> nx.Graph:
-    """Let all decide at once, each considering the actions of all others.
+    """Make all agents neighbors, which decide at the same time.
 
     Examples
     --------
@@ -191,7 +191,7 @@ def coordination_graph(
     edges: Pairs | None = None,
     others: NonNegativeInt | None = None,
 ) -> nx.Graph:
-    """Join neighbors, which decide at once, in a shape or by listed pairs.
+    """Join neighbors, which decide at the same time, in a shape or by listed pairs.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def from_edges(
 def random_hierarchy(
     agents: Names, bodies: Bodies = (), *, seed: NonNegativeInt = 0, density: Fraction = 0.3
 ) -> nx.DiGraph:
-    """Rank agents at random, each above a lower one with a probability.
+    """Order the agents at random, and connect each pair with some probability.
 
     Parameters
     ----------

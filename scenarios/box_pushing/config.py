@@ -122,8 +122,8 @@ class BoxPushingSettings(BoxTaskSettings):
     reward: RewardSettings = RewardSettings()
     """Constants of the reward; `of` selects whether the team or each robot is rewarded."""
     prediction_horizon: Periods = 24
-    """Control periods that predictions look ahead, the decision being held for all of them: so far
-    that what agents do shows."""
+    """Number of control periods that a prediction looks ahead while the decision is held. Choose it
+    long enough that different actions lead to different states."""
 
     leader: LeaderSettings = LeaderSettings()
     """Leader above all robots."""

@@ -185,7 +185,7 @@ as_study = click.option(
     "--as",
     "study",
     metavar="STUDY",
-    help="Analyze the trials as another study (a name or file.py:NAME); nothing is run.",
+    help="Print the tables of another kind of study (a name or file.py:NAME); nothing is run.",
 )
 """Another study than that which the trials were run for."""
 
@@ -224,14 +224,15 @@ columns = click.option(
     multiple=True,
     metavar="ROLE=COLUMN",
     help="Columns of a table of scores by role, separated by commas. Roles are condition, score, "
-    "seed and item; condition=model+topology joins columns. By default, names are the roles.",
+    "seed and item; condition=model+topology joins columns. By default, columns are named like "
+    "their roles.",
 )
 """Roles of the columns of a table, see `nested_agents.studies.api.loading.load`."""
 
 better = click.option(
     "--better",
     type=click.Choice(["higher", "lower"]),
-    help="Which scores of other tools are better; by default higher ones.",
+    help="Whether higher or lower scores of other tools are better; by default higher.",
 )
 """Direction of the scores of a table."""
 

@@ -197,10 +197,10 @@ def _legend(rows: Sequence[CostRow], frame: pd.DataFrame) -> Iterator[str]:
     large = dict.fromkeys(row.topology for row in rows if row.free > auto.exact_up_to)
     if large:
         yield (
-            "The formulas assume an exhaustive search (evaluator exact). If one agent and those "
-            f"below it are more than {auto.exact_up_to}, the default evaluator auto chooses "
-            "sampling or best-response, which try fewer joint actions. "
-            f"Rows: {', '.join(large)}."
+            "The formulas assume an exhaustive search (evaluator exact). If more than "
+            f"{auto.exact_up_to} agents take part in a search, the default evaluator auto chooses "
+            "sampling or best-response, which try fewer joint actions. This concerns "
+            f"{', '.join(large)}."
         )
 
 

@@ -199,7 +199,7 @@ def cross_track_error(situation: Situation, robot: Robot) -> float:
     0.0,
     1.1,
     centers=(0.0, 0.1, 0.3, 0.6, 1.1),
-    labels=("there", "close", "near", "away", "far"),
+    labels=("at the goal", "close", "near", "away", "far"),
     common=True,
     mirrored="same",
 )

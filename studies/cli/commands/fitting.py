@@ -18,15 +18,16 @@ from ..loading import read_results, say_remarks
     "--criterion",
     type=float,
     metavar="SHARE",
-    help="Fit the decisions of training until this share of five episodes in a row succeeds; runs "
-    "that never do are censored.",
+    help="Fit the number of training decisions until this share of five episodes in a row "
+    "succeeds; runs that never reach it are censored.",
 )
 @click.option(
     "--predict",
     type=click.IntRange(1),
     multiple=True,
     metavar="N...",
-    help="Sizes that were not run: the mean of as many seeds, with its 90% interval.",
+    help="Predict these sizes, which were not run: the mean over as many new seeds, with its 90% "
+    "interval.",
 )
 @options.columns
 @options.plot
@@ -46,9 +47,9 @@ def fit(
 
     DIR is the folder of a study that sweeps a size, FILE a file of results or a table of scores as
     compare reads it. Several folders are fitted together if their specs are equal except for the
-    size. Conditions that agree in all else have a law each: a power law, one with a floor or a
-    break point; for rates a logistic curve. The command chooses the law that best predicts the
-    largest sizes from those below.
+    size. Conditions that differ only in the size are fitted by one law: a power law, possibly with
+    a floor or a break point, or a logistic curve for rates. The command chooses the law that,
+    fitted to the smaller sizes, best predicts the largest ones.
     """
     from ...api.growth import scaling_law
 

@@ -73,8 +73,8 @@ def table(
 ) -> int:
     """Print conditions against estimates with their 95% intervals, as at the end of a run.
 
-    DIR is the folder of a study. Several studies are analyzed together, in the way of the first.
-    FILE.json is a file of results that `export --format json` has written.
+    DIR is the folder of a study. Several studies are shown together, in the form of the first one.
+    FILE.json is a file of results of this tool or of marl-eval.
     """
     results = load_results(sources, study=study, where=where, trust=trust)
     if form == "table":
@@ -89,8 +89,8 @@ def table(
 @click.option(
     "--by",
     metavar="KEY",
-    help="Compare conditions that differ only in this swept key, such as topology, or studies by "
-    "directory. By default (condition) all conditions are compared with the first.",
+    help="Compare conditions that differ only in this swept key, such as topology; directory "
+    "compares studies. By default (condition) all conditions are compared with the first.",
 )
 @options.measure
 @options.phase
@@ -99,13 +99,14 @@ def table(
 )
 @options.flag(
     "--statistics",
-    "Add interquartile mean and probability of improvement; the groups of --by are the tasks.",
+    "Add the interquartile mean and the probability of improvement over all tasks. The conditions "
+    "that --by compares with each other form a task.",
 )
 @options.plot
 @options.where
 @options.columns
 @options.better
-@options.out("Write a page with verdicts, table, statistics and figure.", "FILE.html")
+@options.out("Write a page with the results, the table and a figure.", "FILE.html")
 @options.form
 @options.trust
 def compare(
@@ -120,7 +121,7 @@ def compare(
     trust: bool,
     **compared: options.Checked,
 ) -> int:
-    """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
+    """Compare conditions by seed: differences, intervals, p-values, effect sizes and power.
 
     DIR is the folder of a study, FILE.json a file of results of this tool or of marl-eval.
     Conditions are compared on the seeds that both have, in the same environments.

@@ -19,7 +19,7 @@ from ..loading import read_results, say_remarks
     metavar="KIND",
     help="How agents are lost: absent (they neither act nor communicate), left (the hierarchy is "
     "repaired), lost (their messages are lost), or a kind of failure of the scenario, such as "
-    "seized, which takes an actuator.",
+    "seized, in which an actuator fails.",
 )
 @options.measure
 @click.option(
@@ -28,12 +28,12 @@ from ..loading import read_results, say_remarks
     type=int,
     metavar="N",
     default=20,
-    help="Maximum number of sets of two or more agents that are lost.",
+    help="Maximum number of sets of lost agents to evaluate, for each size of two or more.",
 )
 @options.number(
     "--tolerance", "SHARE", 0.1, "Share of the intact performance that a tolerated loss may cost."
 )
-@options.out("Folder for the figures: each hierarchy, agents colored by what their loss costs.")
+@options.out("Folder for figures of the hierarchies; agents are colored by the cost of loss.")
 @options.jobs
 @options.where
 @options.form

@@ -76,7 +76,7 @@ def run(
     changes: tuple[str, ...],
     **running: options.Checked,
 ) -> int:
-    """Run the study of a spec; the same command again continues it.
+    """Run the study of a spec, or resume it: the same command runs the missing trials.
 
     SPEC.toml says what to run; the command demo prints an example with --print-spec.
     """

@@ -54,7 +54,7 @@ READING = {"sources", "columns", "better", "where", "trust"}
     "--check",
     type=options.PATH,
     metavar="FILE.json",
-    help="Compare the predictions of a file with these results: which of them held.",
+    help="Compare the predictions of a file with these results, and say which ones held.",
 )
 @options.columns
 @options.better

@@ -6,9 +6,9 @@ from nested_agents.studies.presentation.legend import meanings
 @pytest.mark.parametrize(
     ("title", "begins"),
     [
-        ("success, eight", "the same in the evaluation of this name"),
-        ("evaluation success, difference", "from the first condition"),
-        ("final distance [m]", "to the goal"),
+        ("success, eight", "success in the evaluation of this name"),
+        ("evaluation success, difference", "difference from the first condition"),
+        ("final distance [m]", "distance from the goal"),
     ],
 )
 def test_a_column_is_explained(title, begins):
