@@ -172,8 +172,10 @@ class Kernel:
         if self._is_asked or os.cpu_count() == 1:
             return
         self._is_asked = True
+        if _cache_file(self.compiled) is None:
+            return
         types = tuple(map(self.compiled.typeof_pyval, args))
-        if _cache_file(self.compiled) is not None and not _is_cached(self.compiled, types):
+        if not _is_cached(self.compiled, types):
             with contextlib.suppress(*CANNOT_ASK):
                 child = _start_child()
                 self._ahead = child
