@@ -372,6 +372,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-plans",
         "locked-joint",
         "large-failures",
+        "wheel-failure-poses",
         "climbing",
         "hierarchies",
         "related-arms",
