@@ -191,7 +191,7 @@ def coordination_graph(
     edges: Pairs | None = None,
     others: NonNegativeInt | None = None,
 ) -> nx.Graph:
-    """Join neighbors, which decide at the same time, in a shape or by listed pairs.
+    """Join neighbors that decide at the same time, in a shape or by listed pairs.
 
     Parameters
     ----------
