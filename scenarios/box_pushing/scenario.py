@@ -395,7 +395,6 @@ class BoxEnvironments(StackedEnvironments[BoxPushing]):
         away, approach, turn = progress_of(batch)
         reached = one.task.reached(away, turn)
         paid = reward(one.task, away, approach, turn, gaps < TOUCHING, readings)
-        if one.task.by_robot:
-            paid = paid[:, one.body]
+        paid = paid[:, one.body] if one.task.by_robot else paid
         rewards = np.broadcast_to(paid, joint_actions.shape)
         return Transitions(states, rewards, reached, ~reached & (away > one.farthest))
