@@ -94,16 +94,11 @@ class TeamSearch:
             hierarchy=self.hierarchy,
             n_actions=n_actions,
             groups=context.scenario.groups,
-            rule=decision.rule,
-            teammates=decision.teammates,
             discount=self._settings.discount,
-            value_of=decision.value_of,
-            unseen=decision.unseen,
-            plan=decision.plan,
             handed_down=is_informed and self.hierarchy.communication == "ancestors",
             members=tuple(i for i in self.hierarchy.order if i in present) or (members[0],),
             is_private=self.is_private,
-            budget=decision.budget,
+            **decision.model_dump(exclude={"evaluator", "errors"}),
         )
         evaluator: Evaluator = decision.evaluator.build(problem)
         must_inherit("learner.decision.evaluator", evaluator, Evaluator)
