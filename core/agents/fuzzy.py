@@ -87,7 +87,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.space, self.rules = settings.rules_over(
             scenario.state_space, scenario.action_set, self._n_told
         )
-        self.rules.prepare_kernels()
         self.mirror = Mirror.of(scenario) if settings.is_mirrored else None
         self.rows = rows_of(scenario, self.members, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
@@ -132,6 +131,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def reset(self, episode: int, *, learn: bool) -> None:
         """Start an episode."""
+        if not self.settings.values_actions:
+            self.rules.prepare_kernels()
         if learn:
             self.explorer.begin_episode()
             self.learner.begin_episode()

@@ -10,8 +10,8 @@ The lock is held while code is read or written, but not during compilation.
 
 A separate process compiles kernels, and the calling process loads them from the cache. A process
 that compiled kernels itself would hold several versions of inner kernels with different rounding,
-so that the first run would differ from later runs in the last bits. Kernels that take long and will
-surely be called are compiled ahead, each by a process of its own, so that two cores are in use.
+so that the first run would differ from later runs in the last bits. Kernels that take long to
+compile and are likely to be called are compiled ahead, each by its own process, on another core.
 
 numba considers a cached kernel valid if the kernel's own file has not changed. Kernels also depend
 on inner kernels and constants of other modules, so that here all imported files count as well.

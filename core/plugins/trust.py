@@ -43,8 +43,10 @@ def trusted_list() -> Path:
 def is_trusted(text: str) -> bool:
     """Tell whether a file of this text may be run, or a module of this `module_text` imported."""
     digest = sha256(text)
-    if digest in _noted:
-        return True
+    return digest in _noted or _is_listed(digest)
+
+
+def _is_listed(digest: str) -> bool:
     with contextlib.suppress(OSError, RuntimeError, ValueError):  # no list, or no home
         return digest in trusted_list().read_text(encoding="ascii").split()
     return False
@@ -55,10 +57,10 @@ def trust(text: str) -> bool:
 
     This is so if the list cannot be written.
     """
-    if is_trusted(text):
-        return True
     digest = sha256(text)
     _noted.add(digest)
+    if _is_listed(digest):
+        return True
     try:
         path = trusted_list()
         path.parent.mkdir(parents=True, exist_ok=True)

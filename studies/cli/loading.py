@@ -83,7 +83,7 @@ def trust_beside(*places: Path) -> None:
 
 
 def load_spec(path: Path, changes: Sequence[str], *, trust: bool, out: Path | None = None) -> Spec:
-    """Read a spec and change it; `trust` trusts the code of the study beside it or in `out`."""
+    """Read a spec and change it; `trust` allows the code of the study beside it or in `out`."""
     from ..spec.spec import Spec
 
     if trust:

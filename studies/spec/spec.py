@@ -377,7 +377,9 @@ def _changed(table: TomlTable, change: TomlTable) -> TomlTable:
         table = {**table, "topology": expand_section("topology", topology)}
     swept, changed = table.get(SWEEP), change.get(SWEEP)
     if isinstance(swept, Mapping) and isinstance(changed, Mapping):
-        return {**table, SWEEP: dict(flat(swept)) | dict(flat(changed))}
+        keys = [key for key, _ in flat(swept)]
+        if len({*keys}) == len(keys):  # else the spec is refused
+            return {**table, SWEEP: dict(flat(swept)) | dict(flat(changed))}
     return override(table, change)
 
 

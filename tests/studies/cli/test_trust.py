@@ -131,7 +131,7 @@ def test_without_a_list_trust_lasts_as_long_as_the_process(
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
     assert not trust.is_trusted("x = 8")
-    assert not trust.trust("x = 8")
+    assert [trust.trust("x = 8") for _ in range(2)] == [False, False]
     assert trust.is_trusted("x = 8")
     assert not trust.is_trusted("x = 9")
 

@@ -663,3 +663,9 @@ def test_set_replaces_a_swept_key_however_it_is_quoted(key: str, changed: str) -
     spec = Spec.parse(text, [f"sweep.{changed}=[8, 16]"])
     assert list(spec.sweep["scenario.robots"]) == [8, 16]
     assert len(spec.conditions()) == 4
+
+
+def test_a_change_of_a_sweep_hides_no_key_that_stands_twice() -> None:
+    text = '[sweep]\n"learner.ridge" = [1.0, 2.0]\nlearner.ridge = [3.0, 4.0]\n'
+    with pytest.raises(SpecError, match=r"sweep\.learner\.ridge .* stands twice"):
+        Spec.parse(text, ["sweep.scenario.robots=[2, 4]"])
