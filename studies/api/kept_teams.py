@@ -73,9 +73,11 @@ class KeptTeams(NamedTuple):
         return [t for t in trials_of(self.spec) if (t.condition, t.seed) in self.identities]
 
     def evaluate(
-        self, trials: Sequence[Trial], jobs: int | None, observer: Observer | None
+        self, trials: Sequence[Trial], task: str, jobs: int | None, observer: Observer | None
     ) -> Results:
         """Evaluate the teams of trials in the further evaluations of the trials.
+
+        The observer is notified of the task first.
 
         Raises
         ------
@@ -83,6 +85,8 @@ class KeptTeams(NamedTuple):
             If a team cannot act in an evaluation; one line.
         """
         measures = check_conditions(self.spec, self.conditions)
+        observer = observer or Terminal()
+        observer.note(task)
         with (
             TemporaryDirectory() as folder,
             start_workers("loky", jobs, None, len(trials)) as workers,
@@ -90,7 +94,7 @@ class KeptTeams(NamedTuple):
         ):
             evaluate = partial(_evaluate, self.directory, self.identities)
             outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
-            (observer or Terminal()).follow(outcomes, len(trials), 0)
+            observer.follow(outcomes, len(trials), 0)
             return read(store)
 
 

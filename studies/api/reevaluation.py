@@ -6,6 +6,7 @@ from itertools import product
 from ...core.numerics import pd
 from ...core.plugins.words import show
 from ..errors import SpecError
+from ..presentation.progress import count
 from ..spec.objects import plain
 from ..spec.tables import TomlTable, label
 from ..store.database import EVALUATION
@@ -59,7 +60,8 @@ def reevaluate(
     study = study if isinstance(study, StudyResults) else load(study)
     changes = {"evaluations": _entries(topology, decision)}
     kept = KeptTeams.of(study.directory, study.trials, changes)
-    frame = kept.evaluate(kept.trials, jobs, observer).episodes
+    task = f"{count(len(changes['evaluations']), 'evaluation')} of each trained team"
+    frame = kept.evaluate(kept.trials, task, jobs, observer).episodes
     frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
     meaning = "topology and decision by which the trained team acts"
     frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}

@@ -17,7 +17,7 @@ from .kept_teams import KeptTeams
 def measure_resilience(
     results: Results,
     kept: KeptTeams,
-    evaluate: Callable[[Sequence[Trial]], Results],
+    evaluate: Callable[[Sequence[Trial], str], Results],
     *,
     fault: str,
     measure: str | None,
@@ -55,7 +55,8 @@ def measure_resilience(
                 losses[own.condition] = tuple((str(k), other) for k, other in enumerate(each))
             open_trials = (trial for trial in kept.trials if trial.condition in losses)
             evaluated = evaluate(
-                [replace(trial, evaluations=losses[trial.condition]) for trial in open_trials]
+                [replace(trial, evaluations=losses[trial.condition]) for trial in open_trials],
+                f"{n_lost} lost: up to {max(map(len, sets))} evaluations of each trained team",
             )
             for own, lost in zip(open_teams, sets, strict=True):
                 for k, units in enumerate(lost):

@@ -32,7 +32,7 @@ SAME = (
     "evaluations",
 )
 """Keys of a spec that must be equal for a study to continue."""
-OTHER_FOLDER = "use another directory"
+OTHER_FOLDER = "write to a new folder (--out)"
 """Advice for a study that does not fit into a directory."""
 
 
@@ -191,7 +191,7 @@ def _examine(directory: Path, spec: Spec, notes: StudyNotes, *, accept_code: boo
     if planned - {trial.identity for trial in trials_of(spec)}:
         raise SpecError(
             f"{directory}: holds trials that are not of this spec, as after a change of Python's "
-            "version; use another directory"
+            f"version; {OTHER_FOLDER}"
         )
     return planned
 
@@ -214,7 +214,10 @@ def difference(old: StudyNotes, new: StudyNotes) -> str | None:
     here = Sources(None, new.sources)
     for name in sorted(old.sources):
         if name not in new.sources or there.digest(name) != here.digest(name):
-            return f"{name} has changed since, or is not a file of this study; {OTHER_FOLDER}"
+            return (
+                f"{name} has changed since, or this spec does not name it; restore it from "
+                f"{FOLDER}/{kept_name(name)}, or {OTHER_FOLDER}"
+            )
     has_all_seeds = set(_seeds(old.spec["seeds"])) <= set(_seeds(new.spec["seeds"]))
     if has_all_seeds and _meaning(old) == _meaning(new):
         return None

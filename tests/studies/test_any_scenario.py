@@ -193,7 +193,7 @@ def test_what_is_not_recorded_is_not_replayed(study):
 
 def test_a_study_whose_scenarios_now_tell_something_else_is_not_continued(study):
     changed = (SUCCESS, SPREAD)
-    with pytest.raises(SpecError, match="use another directory"):
+    with pytest.raises(SpecError, match="--out"):
         made_up.opened(study, SPEC, changed).__enter__()
     with made_up.opened(study, SPEC, check_conditions(SPEC)) as store:
         assert pending(store, trials_of(SPEC)) == []

@@ -39,6 +39,7 @@ READING = {"sources", "columns", "better", "where", "trust"}
 @click.option(
     "--budget",
     default="",
+    show_default=False,
     metavar="LIMITS",
     help='Find the best hierarchy within limits, as "messages <= 50, decision_ms <= 100".',
 )

@@ -99,7 +99,10 @@ def test_nothing_that_came_with_a_study_is_run_unasked(
     (tmp_path / "mine.py").write_text("def ring(agents, groups): return []\n")
     (tmp_path / "spec.toml").write_text(SPEC.replace('"mine.py:STUDY"', '"learning-curve"'))
     assert main(["run", str(tmp_path / "spec.toml"), "--out", str(foreign)]) == 2
-    assert "mine.py has changed since" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "mine.py has changed since" in error
+    assert "sources/mine.py" in error
+    assert "--out" in error
     assert not mark.exists()
 
 

@@ -137,7 +137,9 @@ def test_rows_are_by_position_and_number(arm):
 
 def test_kept_teams_are_evaluated_with_losses(arm, tmp_path, capsys):
     assert main(["resilience", str(arm), "--format", "json", "--jobs", "1"]) == 0
-    own = json.loads(capsys.readouterr().out)
+    output, progress = capsys.readouterr()
+    assert "1 lost: up to 3 evaluations" in progress
+    own = json.loads(output)
     chain, other = own["teams"]
     (compared,) = own["comparison"]
     assert (compared["condition"], compared["reference"]) == (other["condition"], "chain")

@@ -163,7 +163,7 @@ def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
     ):
         pass
     assert said in str(caught.value)
-    assert "use another directory" in str(caught.value)
+    assert "--out" in str(caught.value)
     assert {p: p.read_bytes() for p in finished.rglob("*") if p.is_file()} == before
 
 
