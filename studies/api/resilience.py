@@ -7,7 +7,7 @@ from ..errors import SpecError, refused
 from ..resilience.analysis import Resilience, TeamLosses
 from ..resilience.losses import losable_team, loss_sets, next_number, with_loss
 from ..resilience.report import ResilienceReport
-from ..results.comparison import title_of, values_by_seed
+from ..results.measured import title_of, values_by_seed
 from ..results.results import Results
 from ..store.database import EVALUATION
 from ..trials.trial import Trial

@@ -11,8 +11,8 @@ from ...core.numerics import pd
 from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..results.analysis import Summary
-from ..results.comparison import title_of, values_of
 from ..results.differences import BySeed
+from ..results.measured import title_of, values_of
 from ..results.notation import format_estimate, format_number, format_p, wrapped
 from ..results.permutation_tests import LEVEL, holm
 from ..results.results import Results

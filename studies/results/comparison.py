@@ -15,11 +15,11 @@ from ..errors import SpecError
 from ..spec.tables import SpecTable, aliases, label, named
 from .analysis import NOTHING, Summary, identity_lines, mean_estimate, verdicts
 from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
-from .notation import MIN_LARGEST, wrapped
+from .measured import title_of, values_by_seed, values_of
+from .notation import wrapped
 from .power_text import power_lines
-from .recovery import RECOVERY, recovery_by_seed
-from .results import SECONDS, STEPS, Results, describe_number, row_means
-from .scores import LAST_STEP
+from .recovery import RECOVERY
+from .results import STEPS, Results, row_means
 from .statistics import Array, Estimate, exactly
 
 DIFFERENCE_TITLES = {True: "difference", False: "difference (independent samples)"}
@@ -83,6 +83,8 @@ class ComparisonTable(NamedTuple):
             lines += wrapped(f"Left out of differences, because they have no partner: {left_out}.")
         if self.measure.name in RECOVERY:
             lines += self._without_success()
+        if self.measure.gathering == "sum" and self.measure.better == "lower":
+            lines += wrapped(f"{self.title}: a sum, which is lower in episodes that end early.")
         compared = {c for group in self.groups for c in group.members.values()}
         others = [c for c in self.results.conditions if c not in compared]
         if others:
@@ -105,12 +107,6 @@ class ComparisonTable(NamedTuple):
         return wrapped(text) if texts else []
 
 
-def title_of(measure: Measure, phase: str) -> str:
-    """Return the title of a measure in a phase, ``evaluation success`` or ``success, eight``."""
-    kind, _, name = phase.partition(":")
-    return f"{measure.heading}, {name}" if name else f"{kind} {measure.heading}".lstrip()
-
-
 def compare_conditions(
     results: Results,
     measure: str = "success",
@@ -125,7 +121,8 @@ def compare_conditions(
     results
         Results of any studies.
     measure
-        Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials.
+        Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials. In
+        ``steps``, failed episodes count with the longest that is allowed.
     phase
         Phase of the episodes; by default ``evaluation``, or ``training`` if there is none.
     by
@@ -230,26 +227,6 @@ def power_with_first(results: Results) -> tuple[str, ...]:
     return tuple(power_lines(samples, title_of(measure, phase), of_rates=measure.is_rate))
 
 
-def usual_phase(results: Results, measure: str) -> str:
-    """Return the phase of evaluation if all trained conditions have it, else that of training.
-
-    Series of other tools that were not evaluated are compared at their last step.
-
-    Raises
-    ------
-    SpecError
-        If there are several other phases.
-    """
-    trained = {*results.of_phase("training")}
-    for phase in ("evaluation", LAST_STEP):
-        known = {c for c in results.of_phase(phase) if results.has_any(c, phase, measure)}
-        if known and known >= trained:
-            return phase
-    if LAST_STEP not in results.phases and (trained or len(results.phases) < 2):
-        return next(iter(results.phases), "training")
-    raise SpecError(f"phase: name one, known: {', '.join(results.phases)}")
-
-
 def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[BySeed, BySeed]:
     """Return the means of two conditions by seed, over common episodes if these are paired."""
     if pairs_episodes:
@@ -279,77 +256,6 @@ def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame, *, paired
     count = int((~index.isin(other)).sum() + (~other.isin(index)).sum())
     is_known = paired or results.pairs_episodes
     return f"{count} of {len(index) + len(other)} {unit}" if count and is_known else ""
-
-
-def values_of(
-    results: Results, name: str, phase: str | None = None
-) -> tuple[Measure, dict[str, BySeed], str]:
-    """Return a measure, its means by condition and seed, and their phase."""
-    measure, values, phase = values_by_seed(results, name, phase)
-    return measure, {condition: row_means(own) for condition, own in values.items()}, phase
-
-
-def values_by_seed(
-    results: Results, name: str, phase: str | None = None
-) -> tuple[Measure, dict[str, pd.DataFrame], str]:
-    """Return a measure, its values by condition, and their phase.
-
-    Values have a row for each seed and a column for each episode, or one column for a number of
-    trials or a measure of recovery, which have an empty phase.
-
-    Raises
-    ------
-    SpecError
-        If no trial has finished, or the results have no such measure or phase.
-    """
-    if not results.conditions:
-        raise SpecError("no trial has finished")
-    if phase is not None and phase not in results.phases:
-        raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
-    has_failed = any("onset" in results.numbers(c) for c in results.of_phase("training"))
-    recovery = RECOVERY if has_failed else {}
-    measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
-    titles = {m.heading: m.name for m in reversed([*measures.values()])}
-    titles |= {title: m.name for m in recovery.values() for title in (m.heading, m.title)}
-    name = titles.get(name, name)
-    if name in recovery:
-        measure, values = recovery_by_seed(results, name, phase or "training")
-        return measure, {c: own.to_frame() for c, own in values.items()}, ""
-    if name in measures:
-        phase = phase or usual_phase(results, name)
-        measure = results.steps(phase) if name == STEPS.name else measures[name]
-        of_phase = {c: results.by_seed(c, phase, name) for c in results.of_phase(phase)}
-        known = {c: own for c, own in of_phase.items() if own.size}
-        if not known:
-            raise SpecError(f"measure = {name!r}: no condition has it in the phase {phase!r}")
-        largest = max(float(own.abs().max(axis=None)) for own in known.values())
-        if 0.0 < largest < MIN_LARGEST:
-            raise SpecError(
-                f"measure = {name!r}: the largest value is {largest:.3g}, allowed: at least "
-                f"{MIN_LARGEST:g}, or 0; use a smaller unit"
-            )
-        return measure, known, phase
-    present = {*results.episodes.dropna(axis=1, how="all")}.intersection(measures)
-    return _trial_numbers(results, name, present | {*recovery})
-
-
-def _trial_numbers(
-    results: Results, name: str, others: Collection[str]
-) -> tuple[Measure, dict[str, pd.DataFrame], str]:
-    """Return a number of whole trials as `values_by_seed` does; `others` are further measures."""
-    numbers = {c: results.numbers(c) for c in results.conditions}
-    columns = dict.fromkeys(n for own in numbers.values() for n in own)
-    names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
-    column = next((c for c in columns if name in names[c]), None)
-    if column is None:
-        raise SpecError(f"measure = {name!r}: {closest(name, {*others, *columns})}")
-    measure, factor = describe_number(column)
-    of_trials = {
-        c: pd.DataFrame(factor * own[column], results.seeds(c))
-        for c, own in numbers.items()
-        if column in own
-    }
-    return measure, of_trials, ""
 
 
 def _groups(

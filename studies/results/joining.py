@@ -183,7 +183,9 @@ def combine(
     measures = join_measures(part.measures for part in parts)
     results = assemble(episodes, trials, phases, columns, measures, usage)
     limits = [part.step_limits for part in parts]
-    training, evaluation = (None if None in own else max(own) for own in zip(*limits, strict=True))
+    training, evaluation = (
+        own[0] if len({*own}) == 1 else None for own in zip(*limits, strict=True)
+    )
     pairs_episodes = any(part.pairs_episodes for part in parts)
     return replace(
         results, step_limits=(training, evaluation), pairs_episodes=pairs_episodes

@@ -35,8 +35,8 @@ DONE = "done"
 
 KEPT = "weights kept"
 """Phase of a copied team that keeps the weights it had when the failure began."""
-STEPS = Measure("steps", "steps", better="lower", least=0.0)
-"""Length of an episode [decisions]."""
+STEPS = Measure("steps", "steps", least=0.0)
+"""Length of an episode [decisions]. Neither is better: failed episodes may end early or late."""
 
 
 StepLimits = tuple[int | None, int | None]

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
@@ -17,9 +17,9 @@ from ..laws.scaling import decisions_to_criterion
 from ..laws.size_axis import SizeAxis
 from ..laws.universal import Scaling
 from ..results.analysis import estimate_of, mean_estimate
-from ..results.comparison import title_of, values_by_seed, values_of
 from ..results.differences import BySeed
-from ..results.results import Results, row_means
+from ..results.measured import title_of, values_of
+from ..results.results import Results
 from ..results.statistics import Array, Estimate
 
 ALL_TEAMS = "all teams"
@@ -63,8 +63,8 @@ class ScalabilityData:
     performance_estimates: Mapping[Place, Estimate]
     """Means with the intervals of the study's table."""
     times: Cells
-    """Decisions of an episode; failed episodes count with the longest that is allowed, also if they
-    ended early. Missing where all episodes failed."""
+    """Decisions until success, see `values_by_seed`. Missing where all episodes failed, or where
+    nothing is a success."""
     costs: Mapping[str, Cells]
     """By the name of the cost, see `HEADINGS`."""
     has_criterion: bool = False
@@ -192,16 +192,9 @@ def collect(
 
 def _times(results: Results, phase: str) -> dict[str, BySeed]:
     """Return the times of conditions by seed, see `ScalabilityData.times`."""
-    steps, lengths, phase = values_by_seed(results, TIME, phase or None)
-    limit = steps.bounds[1]
-    times = {}
-    for condition, own in lengths.items():
-        if SUCCESS in results.measures and results.has(condition, phase, SUCCESS.name):
-            own = own.where(results.by_seed(condition, phase) > 0.0, limit)
-        mean = row_means(own)
-        if mean.min() < limit and mean.max() < np.inf:  # else nothing is known of the time
-            times[condition] = mean
-    return times
+    steps, values, _ = values_of(results, TIME, phase or None)
+    limit = steps.bounds[1] if steps.better else 0.0  # without success, nothing is known of times
+    return {condition: own for condition, own in values.items() if own.min() < limit}
 
 
 def _cells(values: Mapping[str, BySeed], places: Mapping[str, Place]) -> Cells:

@@ -22,8 +22,8 @@ from ..laws.size_axis import SizeAxis, check_size, columns_of
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary, mean_estimate
-from ..results.comparison import values_of
 from ..results.json_files import CHECKSUM, checksum
+from ..results.measured import values_of
 from ..results.notation import format_estimate, format_number
 from ..results.results import Results
 from ..results.statistics import Estimate

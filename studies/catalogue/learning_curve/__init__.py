@@ -14,7 +14,7 @@ import numpy as np
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, Summary, estimate_of, evaluated, mean_estimate
-from ...results.comparison import values_by_seed
+from ...results.measured import values_by_seed
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
 from ..study import measure as measure

@@ -56,7 +56,7 @@ def test_conditions_are_compared_in_every_form(study, capsys) -> None:
     out, _ = study
     status, printed, _ = said_by(capsys, "compare", out, "--measure", "steps")
     assert status == 0
-    assert "evaluation steps, minus that of default:" in printed
+    assert "evaluation steps to success, minus that of default:" in printed
     assert "unadjusted)" in printed
     assert max(map(len, printed.splitlines())) <= 80
     latex = said_by(capsys, "compare", out, "--format", "latex")[1]

@@ -67,7 +67,7 @@ def test_no_interval_of_rates_leaves_their_range(own, data) -> None:
 
 
 def lengths(steps: list[list[int]], limits: StepLimits) -> Results:
-    phases = {"evaluation": {"a": {"steps": steps, "success": np.zeros(np.shape(steps))}}}
+    phases = {"evaluation": {"a": {"steps": steps, "success": np.ones(np.shape(steps))}}}
     results = from_arrays(phases, {"a": range(len(steps))}, {}, {}, {"a": {}}, (SUCCESS,))
     return replace(results, step_limits=limits)
 
@@ -85,10 +85,8 @@ def test_lengths_of_episodes_end_at_the_longest_allowed() -> None:
     estimate = estimate_of(results, "a", "evaluation", STEPS)
     assert float(estimate.high) == 150.0
     assert float(estimate.low) == pytest.approx(400 / 3 - 4.3027 * 28.868 / 3**0.5, abs=0.1)
-    assert (
-        float(compare_conditions(results, "steps").table[0].estimates["evaluation steps"].high)
-        == 150.0
-    )
+    compared = compare_conditions(results, "steps").table[0].estimates
+    assert float(compared["evaluation steps to success"].high) == 150.0
     equal = estimate_of(lengths([[25]] * 8, (25, 25)), "a", "evaluation", STEPS)
     assert tuple(map(float, equal)) == (25.0, 25.0, 25.0)
 

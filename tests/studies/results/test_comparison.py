@@ -46,13 +46,34 @@ def test_the_reference_is_the_first_condition_or_a_named_one() -> None:
     assert set(significant) == set(list(results.columns)[:3])
 
 
-def test_what_is_better_depends_on_the_measure() -> None:
-    # Failed episodes take all their steps, which is worse.
-    text = "\n".join(
-        compare_conditions(hierarchies(CHANCES).frames(), "steps", by="topology").notes
-    )
-    assert "worse: star" in text
+@pytest.mark.parametrize("ends_early", [False, True])
+def test_failed_episodes_count_with_all_steps_that_are_allowed(ends_early: bool) -> None:
+    """A team that breaks off at once is not better."""
+    made = hierarchies(CHANCES)
+    if ends_early:
+        for own in made.evaluation.values():
+            own["steps"][own["success"] == 0] = 1
+    results = replace(made.frames(), step_limits=(450, 450))
+    found = compare_conditions(results, "steps", by="topology")
+    text = "\n".join(found.notes)
+    assert "evaluation steps to success, minus that of chain:\n  worse: star" in text
     assert "better" not in text
+    star, _ = found.groups[1].differences[0].values
+    (condition,) = (c for c in results.conditions if "star" in c and "8" in c)
+    success, steps = (results.values(condition, n, "evaluation") for n in ("success", "steps"))
+    assert star == pytest.approx(np.where(success, steps, 450).mean(axis=1))
+
+
+def test_steps_are_refused_where_the_length_of_failures_is_unknown() -> None:
+    with pytest.raises(SpecError, match=r"measure = 'steps': .* compare success"):
+        compare_conditions(hierarchies(CHANCES).frames(), "steps")
+
+
+def test_longer_episodes_without_success_are_neither_better_nor_worse() -> None:
+    results = replace(hierarchies(CHANCES).frames(), measures=(NO_SUCCESS,))
+    text = "\n".join(compare_conditions(results, "steps", by="topology").notes)
+    assert "higher: star" in text
+    assert "worse" not in text
 
 
 def test_numbers_of_whole_trials_are_compared_too() -> None:
@@ -149,7 +170,8 @@ def test_effect_sizes_stand_in_the_table() -> None:
     higher = np.mean([(a > b) + 0.5 * (a == b) for a in own for b in base])
     assert float(worse["P(improvement)"].value) == pytest.approx(higher)
     assert float(worse["Cliff's delta"].value) == pytest.approx(2.0 * higher - 1.0)
-    steps = compare_conditions(hierarchies(CHANCES).frames(), "steps", by="topology")
+    limited = replace(hierarchies(CHANCES).frames(), step_limits=(450, 450))
+    steps = compare_conditions(limited, "steps", by="topology")
     own, base = steps.groups[1].differences[0].values
     lower = np.mean([(a < b) + 0.5 * (a == b) for a in own for b in base])
     improvement = steps.groups[1].table[1].estimates["P(improvement)"]
