@@ -1,5 +1,6 @@
 """Errors of the user, reported in one line."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -28,3 +29,14 @@ def refused(before: str = "", after: str = "") -> Iterator[None]:
         yield
     except ValueError as error:
         raise SpecError(f"{before}{error}{after}") from None
+
+
+def exception_line(error: str) -> str:
+    r"""Return the line that says what went wrong: the first one after the stack of a traceback.
+
+    >>> exception_line("Traceback:\n  File f\nValueError: no path\nfrom 0 to 3\n")
+    'ValueError: no path'
+    """
+    last = re.split(r"^Traceback.*\n", error, flags=re.MULTILINE)[-1]
+    lines = last.split("\n")
+    return next((line for line in lines if line and not line[0].isspace()), last.strip())

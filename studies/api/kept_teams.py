@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
-from ..errors import SpecError
+from ..errors import SpecError, exception_line
 from ..presentation.progress import Terminal
 from ..results.results import DONE, Results, read
 from ..spec.spec import Spec
@@ -103,7 +103,7 @@ def _succeeding(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
     for outcome in outcomes:
         if outcome.error is not None:
             where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
-            raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
+            raise SpecError(f"{where}: {exception_line(outcome.error)}")
         yield outcome
 
 

@@ -45,11 +45,17 @@ class StudyResults(StudyData):
     @classmethod
     def of(cls, store: Store) -> Self:
         """Return the results of an open study."""
-        remarks = (older_results(store), None if store.is_older else other_spec(store))
+        results, failed = read(store), tuple(store.failed())
+        lost = dict.fromkeys(c for c, *_ in failed if c not in results.conditions)
+        remarks = (
+            older_results(store),
+            None if store.is_older else other_spec(store),
+            f"no results, because trials failed: {'; '.join(lost)}" if lost else None,
+        )
         return cls(
             outline=StudyOutline.kept(store),
-            results=read(store),
-            failed=tuple(store.failed()),
+            results=results,
+            failed=failed,
             remarks=tuple(remark for remark in remarks if remark is not None),
             _sources=sources_of(store),
             _settings=store.settings(),

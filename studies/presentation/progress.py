@@ -14,6 +14,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from ...core.plugins.printing import printable
+from ..errors import exception_line
 from ..spec.outline import StudyOutline
 from ..workers.runner import Observer, Outcome
 
@@ -131,5 +132,5 @@ def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
 
 
 def _failure(outcome: Outcome) -> str:
-    last = (outcome.error or "").strip().splitlines()[-1]
-    return f"failed: {outcome.trial.condition}, seed {outcome.trial.seed}: {last}"
+    reason = exception_line(outcome.error or "")
+    return f"failed: {outcome.trial.condition}, seed {outcome.trial.seed}: {reason}"

@@ -25,7 +25,7 @@ from typing import Any
 
 from ...core.interface.measures import Measure
 from ...core.shell import command_line
-from ..errors import SpecError
+from ..errors import SpecError, exception_line
 from . import database, durable, integrity
 from .checksums import find_altered, trial_checksums
 from .connection import open_to_read, open_to_write, transaction
@@ -211,9 +211,9 @@ class Store:
         error = columns.index("error")
         rows = []
         for row in cursor:
-            last = (row[error] or "").rstrip().rpartition("\n")[2] or None
+            reason = exception_line(row[error] or "") or None
             measured = (values.get((row[identity], name)) for name in names)
-            rows.append((*row[:error], last, *row[error + 1 :], *measured))
+            rows.append((*row[:error], reason, *row[error + 1 :], *measured))
         return [*columns, *names], rows
 
     def mean_seconds(self) -> dict[str, float]:

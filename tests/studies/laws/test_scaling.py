@@ -17,6 +17,8 @@ from nested_agents.studies.results.results import from_arrays
 from research import RESULTS
 
 SIZES = (2, 4, 8)
+ALWAYS = {"chain": -1.0}
+"""Teams that succeed from the first episode on."""
 
 
 def made_up(rates, seeds=6, episodes=12, sizes=SIZES):
@@ -91,7 +93,7 @@ def test_a_truth_value_is_no_size() -> None:
 
 
 def test_a_law_beyond_the_range_of_a_measure_is_explained() -> None:
-    law = scaling_law(made_up({"chain": 1.0}), "steps", predict=[4, 10**6])
+    law = scaling_law(made_up(ALWAYS), "steps", predict=[4, 10**6])
     assert float(law.table[0].estimates["at 4 (90%)"].value) == pytest.approx(40.0)
     assert "outside the range" not in " ".join(law.notes)
     share = replace(SUCCESS, name="share", is_rate=False, least=0.0, greatest=1.0)
@@ -139,7 +141,7 @@ def test_equal_values_are_no_law() -> None:
 
 
 def test_seeds_that_agree_do_not_make_a_law_certain() -> None:
-    law = scaling_law(made_up({"chain": 1.0}), "steps")
+    law = scaling_law(made_up(ALWAYS), "steps")
     assert "all seeds agree, so that intervals" in " ".join(" ".join(law.notes).split())
 
 
