@@ -131,8 +131,6 @@ class FuzzyAgents(Agents[FuzzyInputs]):
 
     def reset(self, episode: int, *, learn: bool) -> None:
         """Start an episode."""
-        if not self.settings.values_actions:
-            self.rules.prepare_kernels()
         if learn:
             self.explorer.begin_episode()
             self.learner.begin_episode()

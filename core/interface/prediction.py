@@ -62,6 +62,10 @@ class Prediction(ABC):
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
         return None
 
+    def prepare_kernels(self) -> None:
+        """Begin to compile what `states_by_group` calls, if that takes long; by default nothing."""
+        return None
+
     def of(self, agent: int) -> Prediction:
         """Return the prediction of an agent with its own sensors; by default this prediction."""
         return self

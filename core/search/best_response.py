@@ -34,7 +34,7 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..interface.prediction import Exploring, Prediction
+from ..interface.prediction import NOT_EXPLORING, Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..values.rule_base import PooledWeights, RuleBase
 from .drawing import choose_among_equal
@@ -80,6 +80,10 @@ class RespondingPrediction(Prediction):
         It is used if all agents receive all decisions and decide body by body by the value of the
         team. It must consume the same random numbers.
         """
+
+    def prepare_responses(self, rules: RuleBase, search: Search) -> None:
+        """Begin to compile what this search calls, if that takes long; by default nothing."""
+        return None
 
 
 class BestResponseSettings(EvaluatorSettings):
@@ -227,15 +231,27 @@ class BestResponse(Aggregation):
         respond = prediction.best_responses(self.rules)
         if respond is None:
             return None
-        starts = self._with_starts(first, self._free[first.agent])
+        search = self._search(first, exploring)
         every = np.arange(self.n_actions**self._widest)
         alike = every if prediction.alike is None else prediction.alike
         n_bodies = len(self.problem.groups)
         distinct = np.count_nonzero(np.broadcast_to(alike, (n_bodies, len(every))) == every)
-        self.count(first.agent, len(starts) + int(distinct) + len(every) * n_bodies)
+        self.count(first.agent, len(search.starts) + int(distinct) + len(every) * n_bodies)
+        return respond(search)
+
+    def _search(self, first: DecisionContext, exploring: Exploring) -> Search:
+        """Return the input of one search for all agents."""
+        starts = self._with_starts(first, self._free[first.agent])
         value = partial(self.predicted_worth, first)
-        pooled = self.pooled(first)
-        return respond(Search(pooled, starts, value, self._order, exploring, first.rng))
+        return Search(self.pooled(first), starts, value, self._order, exploring, first.rng)
+
+    def prepare_kernels(self, context: DecisionContext) -> None:
+        """Begin to compile what later decisions call, while all values are zero."""
+        prediction = context.prediction
+        if self._decides_jointly and isinstance(prediction, RespondingPrediction):
+            prediction.prepare_responses(self.rules, self._search(context, NOT_EXPLORING))
+        else:
+            super().prepare_kernels(context)
 
     def _plan(self, context: DecisionContext, budget: int) -> IntArray:
         """Return the plan ``(n,)`` as the deciding agent knows it, within a budget if it is new."""

@@ -212,6 +212,7 @@ class Aggregation(Evaluator):
         self._weights: Sequence[FloatArray] = ()
         self._pooled: PooledWeights | None = None
         self._have_learned: set[int] = set()
+        self._is_prepared = False
 
     @staticmethod
     def require(key: str, value: str, allowed: str, why: str) -> None:
@@ -272,7 +273,16 @@ class Aggregation(Evaluator):
             return False
         if any(context.weights[i].any() for i in self.concerned[agent].tolist()):
             self._have_learned.add(agent)
-        return agent not in self._have_learned
+        is_zero = agent not in self._have_learned
+        if is_zero and not self._is_prepared:
+            self._is_prepared = True
+            self.prepare_kernels(context)
+        return is_zero
+
+    def prepare_kernels(self, context: DecisionContext) -> None:
+        """Begin to compile what later decisions call, while all values are zero."""
+        self.rules.prepare_kernels()
+        context.prediction.prepare_kernels()
 
     def pooled(self, context: DecisionContext) -> PooledWeights:
         """Return the summed weights of the averaged agents, the same object within a decision."""

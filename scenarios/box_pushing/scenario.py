@@ -27,7 +27,7 @@ from .config import BoxPushingSettings
 from .measurements import MEASURES, ORIENTATION
 from .prediction.calibration import CONSTANTS, PushBelief, measured_twists
 from .prediction.poses import BOX_SIGNS, ROBOT_SIGNS, TWIST_SIGNS
-from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState, prepare_kernels
+from .prediction.prediction import BoxPrediction, PredictionSettings, PresentState
 from .prediction.predictors import ExactPrediction, push_model
 from .prediction.settings import BeliefSettings
 from .states.kernel import progress_of
@@ -102,8 +102,9 @@ class BoxPushing(Scenario):
         self.groups = tuple(map(tuple, every.tolist()))
         self.body = np.repeat(numbers, len(names))
         self.action_set = ActionSet()
-        self.world = World(robots, self.box, infrared=settings.infrared)
         self.space = state_space_for(settings.state_space, self.robot.max_speed)
+        self.space.prepare_kernel(self.box.shape)
+        self.world = World(robots, self.box, infrared=settings.infrared)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
         self._unit_speeds = settings.speed_increment * self._limits
         self.state_space = self.space.space
@@ -123,9 +124,11 @@ class BoxPushing(Scenario):
         )
         self._prediction = self._shared_settings()
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        prepare_kernels(self._model, self.space)
-        # Robots that do not fit around the box are refused now, not in the middle of a study.
-        BoxPushing.reset(self, 0)
+        # Robots that do not fit around the box, and state variables of users that fail, are refused
+        # now, not in the middle of a study.
+        self._begin(0)
+        if not self.space.is_built_in:
+            self.states_at_rest()
 
     def _shared_settings(self) -> PredictionSettings:
         """Return the settings that all predictions share."""
@@ -159,6 +162,11 @@ class BoxPushing(Scenario):
 
         Failures are scheduled by the number of the `episode`.
         """
+        self._begin(seed, episode)
+        return self.states_at_rest()
+
+    def _begin(self, seed: int | np.random.SeedSequence, episode: int = 0) -> None:
+        """Place robots, box and goal, and schedule failures."""
         self._sensing = stream_of(seed, SENSING)
         rng = np.random.default_rng(seed)
         start = self.settings.start
@@ -171,7 +179,6 @@ class BoxPushing(Scenario):
         self._failures.begin(seed, episode)
         self.world.set_grip(self._failures.grip)
         self._save()
-        return self.states_at_rest()
 
     def states_at_rest(self) -> FloatArray:
         """Return the states ``(n, d)`` of all agents if the box has not moved."""

@@ -11,12 +11,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ....core.interface.prediction import Assumptions, EmbodiedPrediction
+from ....core.interface.prediction import Assumptions, EmbodiedPrediction, Exploring
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray, compile_ahead
 from ....core.search.best_response import RespondingPrediction, Responses, Search
 from ....core.values.rule_base import RuleBase
-from ..states.kernel import evaluate, progress_of
+from ..states.kernel import progress_of
 from ..states.situations import SituationBatch
 from ..states.state_spaces import BoxStateSpace
 from ..world.reward import Task, reward
@@ -73,15 +73,6 @@ class PredictionSettings:
     """Decision period [s]."""
     horizon: float
     """Prediction horizon [s]."""
-
-
-def prepare_kernels(model: PushModel, space: BoxStateSpace) -> None:
-    """Begin to compile the kernels of predictions that take longest, if they are not cached."""
-    pose, poses = np.zeros(3), np.zeros((3, 1))
-    actions = np.zeros((1, 1), np.int64)
-    batch = SituationBatch(poses[None], poses, poses[:1], pose, poses, 1.0, model.shape)
-    compile_ahead(evaluate, batch, actions[0], space.columns)
-    compile_ahead(push, poses.T.copy(), pose, pose[None, None], actions, 1.0, model)
 
 
 class BoxPrediction(EmbodiedPrediction, RespondingPrediction):
@@ -177,7 +168,29 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction):
             return None
         return partial(self._respond, rules)
 
+    def prepare_kernels(self) -> None:
+        """Begin to compile `push`, if it is not cached."""
+        now, twists = self.situation, self.wheel_commands.twists
+        actions = np.zeros((len(self.groups), 1), np.int64)
+        compile_ahead(push, now.robots, now.box, twists, actions, 1.0, self.model)
+
+    def prepare_responses(self, rules: RuleBase, search: Search) -> None:
+        """Begin to compile `respond`, if it is not cached."""
+        if self.best_responses(rules) is not None:
+            compile_ahead(respond, *self._arguments(rules, search))
+
     def _respond(self, rules: RuleBase, search: Search) -> IntArray:
+        joint = respond(*self._arguments(rules, search))
+        if not len(joint):
+            raise ArithmeticError(
+                "no joint action has the greatest value: not all values are numbers"
+            )
+        return joint
+
+    def _arguments(
+        self, rules: RuleBase, search: Search
+    ) -> tuple[IntArray, IntArray, int, Outlook, Exploring, np.random.Generator]:
+        """Return the arguments of `respond`."""
         now = self.situation
         settings = self.settings
         weights, agents, _, firsts = search.pooled
@@ -195,12 +208,7 @@ class BoxPrediction(EmbodiedPrediction, RespondingPrediction):
         wheels = len(self.groups[0])
         order = search.order[::wheels] // wheels
         n_actions = len(settings.action_set)
-        joint = respond(search.starts, order, n_actions, outlook, search.exploring, search.rng)
-        if not len(joint):
-            raise ArithmeticError(
-                "no joint action has the greatest value: not all values are numbers"
-            )
-        return joint
+        return search.starts, order, n_actions, outlook, search.exploring, search.rng
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""

@@ -12,8 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
-from ....core.numerics import FloatArray
+from ....core.numerics import FloatArray, compile_ahead
 from ...state_variables import StateVariable, find_variable, space_of
+from ..world.geometry import BoxShape
 from .kernel import Columns, columns_of, evaluate
 from .situations import SituationBatch, whole_batch
 from .variables import STATE_VARIABLES
@@ -37,6 +38,12 @@ class BoxStateSpace:
     def is_built_in(self) -> bool:
         """Whether all shared variables are built in."""
         return all(variable.trusted for variable in self.variables)
+
+    def prepare_kernel(self, shape: BoxShape) -> None:
+        """Begin to compile `evaluate` for these columns, if it is not cached."""
+        poses = np.zeros((3, 1))
+        batch = SituationBatch(poses[None], poses, poses[:1], poses[:, 0].copy(), poses, 1.0, shape)
+        compile_ahead(evaluate, batch, np.zeros(1, np.int64), self.columns)
 
     def shared(self, batch: SituationBatch, robots: Sequence[int]) -> FloatArray:
         """Return the shared variables ``(k, m, d - 1)`` of k robots in m situations.
