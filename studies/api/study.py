@@ -9,8 +9,8 @@ Examples
 >>> out = tempfile.mkdtemp()
 >>> spec = {"seeds": 2, "episodes": 1, "steps": 2, "evaluation": 1, "preset": "random"}
 >>> study = run(spec, out, jobs=1, progress=False)
->>> study.conditions, study.table(["success last 5"]).titles
-(('random',), ('success last 5',))
+>>> study.conditions, study.table(["training success"]).titles
+(('random',), ('training success',))
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import numpy as np
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ..errors import WIDTH
-from .differences import Difference, Pair, differences
+from .differences import MIN_RUNS, Difference, Pair, count_unpaired, differences
 from .notation import wrapped
 from .permutation_tests import LEVEL
 from .power_text import independent_power_lines, power_lines
@@ -89,6 +89,13 @@ def phases_of(results: Results) -> dict[str, str]:
         for phase in ("training", "evaluation")
         if all(results.has(condition, phase) for condition in conditions)
     }
+
+
+def left_out_lines(results: Results, phase: str) -> list[str]:
+    """Return lines that name the conditions without episodes of a phase."""
+    others = [c for c in results.conditions if not results.has(c, phase)]
+    names = "; ".join(others)
+    return wrapped(f"Not in the table, because they have no {phase}: {names}.") if others else []
 
 
 Figures: TypeAlias = "dict[str, Figure]"
@@ -201,10 +208,27 @@ def judged(
     title
         Its title in the headings, unless the names of groups contain it.
     """
-    compared = differences(groups, measure)
+    pairs = {group: list(own) for group, own in groups.items()}
+    compared = differences(pairs, measure)
     heads = {group: ": ".join(filter(None, (group, title))) for group in groups}
     by_head = {f"{heads[g]}, minus that of {reference}": compared[g] for g in groups}
-    return compared, verdicts(by_head, measure)
+    lines = verdicts(by_head, measure)
+    unpaired = dict.fromkeys(
+        f"{count} runs of {reference} and {name if group == title else f'{group}, {name}'}"
+        for group, each in pairs.items()
+        for name, title, own, base in each
+        if len(own.index.intersection(base.index)) >= MIN_RUNS
+        and (count := count_unpaired(own.index, base.index))
+    )
+    return compared, lines + unpaired_lines(unpaired)
+
+
+def unpaired_lines(counts: Iterable[str]) -> list[str]:
+    """Return lines on runs without a partner, counted for each pair of conditions."""
+    text = "; ".join(counts)
+    return (
+        wrapped(f"Left out of differences, because they have no partner: {text}.") if text else []
+    )
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:

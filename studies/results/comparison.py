@@ -13,8 +13,23 @@ from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import SpecTable, aliases, label, named
-from .analysis import NOTHING, Summary, identity_lines, mean_estimate, verdicts
-from .differences import MIN_RUNS, BySeed, Difference, Pair, differences, select_shared
+from .analysis import (
+    NOTHING,
+    Summary,
+    identity_lines,
+    mean_estimate,
+    unpaired_lines,
+    verdicts,
+)
+from .differences import (
+    MIN_RUNS,
+    BySeed,
+    Difference,
+    Pair,
+    count_unpaired,
+    differences,
+    select_shared,
+)
 from .measured import title_of, values_by_seed, values_of
 from .notation import wrapped
 from .power_text import power_lines
@@ -78,9 +93,7 @@ class ComparisonTable(NamedTuple):
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, minus that of {group.reference}"] = group.differences
         lines = verdicts(groups, self.measure, self.title)
-        left_out = "; ".join(text for group in self.groups for text in group.left_out)
-        if left_out:
-            lines += wrapped(f"Left out of differences, because they have no partner: {left_out}.")
+        lines += unpaired_lines(text for group in self.groups for text in group.left_out)
         if self.measure.name in RECOVERY:
             lines += self._without_success()
         if self.measure.gathering == "sum" and self.measure.better == "lower":
@@ -253,9 +266,8 @@ def _left_out(results: Results, own: pd.DataFrame, base: pd.DataFrame, *, paired
         unit = "scores"
     if not paired:
         index, other = (keys.get_level_values(-1) for keys in (index, other))
-    count = int((~index.isin(other)).sum() + (~other.isin(index)).sum())
-    is_known = paired or results.pairs_episodes
-    return f"{count} of {len(index) + len(other)} {unit}" if count and is_known else ""
+    count = count_unpaired(index, other) if paired or results.pairs_episodes else ""
+    return f"{count} {unit}" if count else ""
 
 
 def _groups(

@@ -201,6 +201,16 @@ def select_shared(values: Sequence[BySeed]) -> list[Array]:
     return [own.loc[seeds].to_numpy() for own in values]
 
 
+def count_unpaired(own: pd.Index, base: pd.Index) -> str:
+    """Return the number of runs without a partner, of all; empty if every run has one.
+
+    >>> count_unpaired(pd.Index([0, 1, 2]), pd.Index([0, 2])), count_unpaired(*[pd.Index([0])] * 2)
+    ('1 of 5', '')
+    """
+    count = int((~own.isin(base)).sum() + (~base.isin(own)).sum())
+    return f"{count} of {len(own) + len(base)}" if count else ""
+
+
 def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
     """Return the first success rate minus the second, from outcomes ``(n_runs, n_episodes)``.
 

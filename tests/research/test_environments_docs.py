@@ -24,7 +24,7 @@ COLUMNS = ("success last 5", "evaluation success", "total reward")
     ("name", "columns"),
     [
         ("pendulum", COLUMNS),
-        ("pendulum-written", COLUMNS),
+        ("pendulum-written", ("training success", *COLUMNS[1:])),
         ("cartpole", ("success last 5", "evaluation success", "evaluation steps")),
         ("spread", ("evaluation steps", "total reward")),
         ("multiwalker", ("evaluation steps", "total reward")),

@@ -29,7 +29,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
     [
         ("learning-curve", COLUMNS),
         ("tasks", COLUMNS),
-        ("tasks-written", COLUMNS),
+        ("tasks-written", ("training success", *COLUMNS[1:])),
         ("hand-written", ("evaluation success", "all touch")),
         ("told", COLUMNS),
         ("scaling", ("evaluation success", "all touch")),

@@ -139,7 +139,7 @@ def test_the_learning_curve_and_its_publication(study):
     learning = load_study("learning-curve")
     analysis = learning.analyse(results)
     assert tabulate(analysis.table).titles == (
-        "success last 5", "evaluation success", "evaluation steps",
+        "training success", "evaluation success", "evaluation steps",
         "greatest spread of the carts [m]", "distance [m]",
     )  # fmt: skip
     (figure,) = learning.draw(analysis).values()

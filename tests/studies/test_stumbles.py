@@ -31,7 +31,7 @@ def test_every_failure_is_marked() -> None:
 
 def test_short_training_has_no_identical_columns() -> None:
     assert [title for title, *_ in metrics_of((SUCCESS,), SUCCESS, STEPS, 4)][:2] == [
-        "success last 5", "evaluation success",
+        "training success", "evaluation success",
     ]  # fmt: skip
     assert metrics_of((SUCCESS,), SUCCESS, STEPS, 6)[0][0] == "success first 5"
 

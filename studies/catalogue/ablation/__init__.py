@@ -8,7 +8,15 @@ are adjusted by Holm's method over all conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures, Summary, estimate_of, judged, phases_of
+from ...results.analysis import (
+    Analysis,
+    Figures,
+    Summary,
+    estimate_of,
+    judged,
+    left_out_lines,
+    phases_of,
+)
 from ...results.differences import Pair
 from ...results.results import Results
 from ...results.statistics import exactly
@@ -43,7 +51,8 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
             if (name, title) in by_place:
                 estimates[f"{title}, difference"] = by_place[name, title]
         table.append(Summary(name, len(results.seeds(condition)), estimates))
-    return Analysis(tuple(table), tuple(notes), differences=compared)
+    left_out = left_out_lines(results, "training")
+    return Analysis(tuple(table), (*left_out, *notes), differences=compared)
 
 
 def draw(analysis: Analysis) -> Figures:

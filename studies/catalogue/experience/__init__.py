@@ -15,8 +15,15 @@ import numpy as np
 
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import EVALUATED, Analysis, Figures, Summary, estimate_of, verdicts
-from ...results.differences import differences
+from ...results.analysis import (
+    EVALUATED,
+    Analysis,
+    Figures,
+    Summary,
+    estimate_of,
+    judged,
+    left_out_lines,
+)
 from ...results.results import CPU, Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, stack_estimates
 from ...spec.spec import Spec
@@ -27,6 +34,7 @@ from ..study import check_evaluated
 
 AFTER = "after "
 """Prefix of the phases of evaluations during training; the number of decisions follows."""
+AFTER_LINE = "after N: at the first stop at or after N joint decisions of all environments."
 FIRST = 1000
 """Decisions before the first evaluation."""
 DECISIONS = "decisions"
@@ -123,12 +131,8 @@ def analyse(results: Results) -> Analysis:
             courses.append((condition, index, is_sampled, decisions, stacked))
     means = [results.means(condition, "evaluation", measure.name) for condition in conditions]
     pairs = [(c, title, own, means[0]) for c, own in zip(conditions, means, strict=True)]
-    compared = differences({title: pairs[1:]}, measure)
-    heads = {f"{title}, minus that of {conditions[0]}": compared[title]}
-    notes = [
-        "after N: when evaluated after N joint decisions of training, of all environments.",
-        *verdicts(heads, measure),
-    ]
+    compared, lines = judged({title: pairs[1:]}, conditions[0], measure)
+    notes = [AFTER_LINE, *left_out_lines(results, "evaluation"), *lines]
     if any(is_sampled for _, _, is_sampled, *_ in courses):
         notes.insert(1, "Sampled actions are drawn from the policy; others are greedy.")
     return Analysis(tuple(table), tuple(notes), courses, compared)

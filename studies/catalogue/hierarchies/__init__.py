@@ -23,6 +23,7 @@ from ...results.analysis import (
     Summary,
     estimate_of,
     judged,
+    left_out_lines,
     steps_estimate,
 )
 from ...results.differences import Pair
@@ -104,6 +105,7 @@ def analysis_of(results: Results, cases: Sequence[SizedCase], reference: str) ->
         text = f"Not compared, because {reference} is missing: {'; '.join(others)}."
         lines = [*lines, *wrapped(text)]
     notes = ["Rows: setting, hierarchy."] * any(case.group for case in cases)
+    notes += left_out_lines(results, "evaluation")
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
 
 

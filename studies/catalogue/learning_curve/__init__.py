@@ -13,7 +13,15 @@ import numpy as np
 
 from ....core.interface.measures import RETURN, SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures, Summary, estimate_of, evaluated, mean_estimate
+from ...results.analysis import (
+    Analysis,
+    Figures,
+    Summary,
+    estimate_of,
+    evaluated,
+    left_out_lines,
+    mean_estimate,
+)
 from ...results.measured import values_by_seed
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rates
@@ -58,11 +66,20 @@ def metrics_of(
     title = main.heading
     return (
         *[(f"{title} first {BLOCK}", main, "first")] * (episodes > BLOCK),
-        (f"{title} last {BLOCK}", main, "last"),
+        (last_title(title, episodes), main, "last"),
         (f"evaluation {title}", main, "evaluation"),
         ("evaluation steps", steps, "evaluation"),
         *((m.heading, m, "last") for m in measures if m.name != SUCCESS.name and not m.is_rate),
     )
+
+
+def last_title(title: str, episodes: int) -> str:
+    """Return the heading of the mean of the last `BLOCK` episodes of training.
+
+    >>> last_title("success", 20), last_title("success", 3)
+    ('success last 5', 'training success')
+    """
+    return f"{title} last {BLOCK}" if episodes >= BLOCK else f"training {title}"
 
 
 def curves_of(measure: Measure, training: Mapping[str, Array]) -> dict[str, Estimate]:
@@ -100,7 +117,8 @@ def analyse(results: Results) -> Analysis:
             values = {c: results.values(c, m.name) for c in own}
             followed.append((m, values))
     is_ragged = any(np.isnan(v).any() for _, values in followed for v in values.values())
-    return Analysis(tuple(table), (UNEQUAL,) * is_ragged, followed)
+    notes = (*left_out_lines(results, "training"), *(UNEQUAL,) * is_ragged)
+    return Analysis(tuple(table), notes, followed)
 
 
 def _of_evaluations(results: Results) -> Analysis:

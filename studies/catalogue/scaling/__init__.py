@@ -13,13 +13,14 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.numerics import FloatArray
-from ...results.analysis import Analysis, Figures, Summary, estimate_of, evaluated
+from ...results.analysis import Analysis, Figures, Summary, estimate_of, evaluated, left_out_lines
 from ...results.results import Results
 from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, bootstrap, exactly
 from ...spec.tables import label_but
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..learning_curve import BLOCKS, last_title
 from ..sized import SizedCase, draw_by_size
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median")
@@ -82,16 +83,16 @@ def analyse(results: Results) -> Analysis:
         is_size = case.condition == str(case.robots)
         label = sizes.shown(case.robots) if is_size else case.condition
         table.append(Summary(label, len(results.seeds(case.condition)), case.values))
-    return Analysis(tuple(table), cases=cases)
+    return Analysis(tuple(table), tuple(left_out_lines(results, "training")), cases)
 
 
 def _case(results: Results, condition: str, sizes: Sizes) -> SizedCase:
     numbers = results.numbers(condition)
-    steps = results.values(condition, "steps").sum(axis=1)
+    steps = results.values(condition, "steps")
     main = results.main
     values = {
-        f"{main.heading} last 5": estimate_of(
-            results, condition, "training", main, slice(-5, None)
+        last_title(main.heading, steps.shape[1]): estimate_of(
+            results, condition, "training", main, BLOCKS["last"]
         ),
         **evaluated(results, condition),
     }
@@ -99,7 +100,7 @@ def _case(results: Results, condition: str, sizes: Sizes) -> SizedCase:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
     costs = {
         "decision [ms]": 1e3 * numbers["decision_median"],
-        "learning [ms]": 1e3 * numbers["seconds.learning"] / steps,
+        "learning [ms]": 1e3 * numbers["seconds.learning"] / steps.sum(axis=1),
         "team [MB]": 1e-6 * numbers["team_bytes"],
     }
     values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}

@@ -34,7 +34,7 @@ def study(places):
 def test_a_study_tells_its_conditions_table_and_notes(study) -> None:
     assert study.conditions == ("default", "frozen")
     assert study.outline.seeds == (0, 1, 2)
-    table = study.table(["success last 5"])
+    table = study.table(["training success"])
     assert str(table).splitlines()[1].split()[0] == "default"
     assert table._repr_html_().count("<tr>") == 2
     assert "<th>default, 3 seeds</th>" in study._repr_html_()

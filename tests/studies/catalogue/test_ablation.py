@@ -1,10 +1,12 @@
 from dataclasses import replace
 from pathlib import Path
 
-from made_up_results import NOTHING, ablation
+import pytest
+from made_up_results import NOTHING, ablation, hierarchies
 
 from nested_agents.studies.catalogue import ablation as module
 from nested_agents.studies.catalogue.ablation import analyse, draw
+from nested_agents.studies.catalogue.study import analyse_as, load_study
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 
@@ -34,6 +36,26 @@ def test_a_condition_without_two_seeds_in_common_has_no_difference() -> None:
     assert len(titles) == 2
     assert titles <= by_name["default"].keys()
     assert not titles & by_name["no replay"].keys()
+
+
+@pytest.mark.parametrize("name", ["ablation", "hierarchies"])
+def test_runs_without_a_partner_are_counted(name: str) -> None:
+    chances = {("chain", "team", 2): 0.9, ("star", "team", 2): 0.5}
+    made = ablation(CHANCES) if name == "ablation" else hierarchies(chances)
+    own = list(made.training)[1]
+    made.seeds[own] = tuple(range(5, 25))
+    text = " ".join(" ".join(load_study(name).analyse(made.frames()).notes).split())
+    reference, label = ("default", own) if name == "ablation" else ("chain", "2 robots, team, star")
+    assert text.count("Left out of differences") == 1
+    assert f"no partner: 10 of 40 runs of {reference} and {label}." in text
+
+
+@pytest.mark.parametrize("name", ["ablation", "learning-curve"])
+def test_conditions_without_training_are_named(name: str) -> None:
+    made = ablation({"default": 0.8, "slow": 0.4, "random": 0.1})
+    del made.training["random"]
+    (line,) = [n for n in analyse_as(name, made.frames()).notes if "Not in the table" in n]
+    assert "training: random" in line
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
