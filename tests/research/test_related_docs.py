@@ -8,8 +8,7 @@ from programs import main
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check_conditions
-from research import RESULTS, SPECS
-from research.claims import CATALOG
+from research import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "research" / "notebooks" / "related.md").read_text(encoding="utf-8")
@@ -23,12 +22,6 @@ def test_specs(spec: str) -> None:
 @pytest.mark.parametrize("path", re.findall(r"nested-agents run (\S+\.toml)", TEXT))
 def test_commands_name_specs_that_can_be_built(path: str) -> None:
     check_conditions(Spec.load(ROOT / path))
-
-
-def test_specs_that_are_named_exist() -> None:
-    named = set(re.findall(r"[\w/-]+\.toml", TEXT))
-    folders = (ROOT, SPECS, CATALOG)
-    assert [p for p in named if not any((folder / p).exists() for folder in folders)] == []
 
 
 @pytest.mark.parametrize(

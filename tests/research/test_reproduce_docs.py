@@ -8,14 +8,25 @@ from programs import main
 
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.database import RESULTS_VERSION
-from research import RESULTS
+from nested_agents.studies.store.database import RESULTS_VERSION, SPEC_FILE
+from research import RESULTS, SPECS
+from research.claims import CATALOG
 
 ROOT = Path(__file__).resolve().parents[2]
+NOTEBOOKS = ROOT / "research" / "notebooks"
+FOLDERS = (ROOT, SPECS, CATALOG)
+"""Folders of specs, from which a notebook names one."""
 TEXT = (ROOT / "docs" / "reproduce.md").read_text(encoding="utf-8")
 LINES = re.findall(
     r"^\| `([\w-]+)` \| `([\w/-]+\.toml)` \| ([\d,]+) \| ([\d,]*) ?\|", TEXT, re.MULTILINE
 )
+
+
+@pytest.mark.parametrize("notebook", sorted(NOTEBOOKS.glob("*.md")), ids=lambda page: page.stem)
+def test_specs_that_a_notebook_names_exist(notebook: Path) -> None:
+    named = set(re.findall(r"`([\w/*-]+\.toml)`", notebook.read_text(encoding="utf-8")))
+    found = {name for name in named for folder in FOLDERS if any(folder.glob(name))}
+    assert named - found - {SPEC_FILE} == set()
 
 
 def test_every_published_table_has_its_row() -> None:
