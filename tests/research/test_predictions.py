@@ -33,7 +33,7 @@ def test_free_motion_agrees_with_the_theory_as_well_as_is_documented(
     runpy.run_module("research.free_motion", run_name="__main__")
     said = capsys.readouterr().out
     (ahead, yaw) = re.findall(
-        r"within (\S+) mm/s and (\S+)\s+rad/s",
+        r"within\s+(\S+)\s+mm/s\s+and\s+(\S+)\s+rad/s",
         (DOCS / "environments" / "box_pushing.md").read_text(encoding="utf-8"),
     )[0]
     rows = re.findall(r"^\| [\w-]+ \| (\S+) \| (\S+) \| (\S+) \| (\S+) \|$", said, re.MULTILINE)
