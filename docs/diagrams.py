@@ -45,7 +45,7 @@ LINES = (
     ("#CC79A7", (0, (6, 1.5)), "v"),
 )
 """Color, line style and marker of the first, second, ... line: they differ in gray, too."""
-EQUAL_COMPUTING = "At equal computing the chain needs the fewest decisions"
+EQUAL_COMPUTING = "At equal computing the lead of the chain grows"
 ACTIONS = ("increase", "decrease", "maintain", "zero")
 
 
@@ -495,25 +495,38 @@ def success_by_size() -> Figure:
     return titled(figure, "The team's value lets teams scale to 16 robots")
 
 
+def steps_to_success(results: Results, condition: str) -> np.ndarray:
+    """Return mean decisions by seed; failed episodes count with the longest, 450."""
+    steps = results.values(condition, "steps", "evaluation")
+    return np.where(results.success(condition, "evaluation") == 1, steps, 450).mean(axis=1)
+
+
 def equal_computing() -> Figure:
     """Draw success and decisions to the goal by number of robots, for two budgets."""
-    results = load("equal-computing-boxes").results
-    budgets, robots = (64, 1024), (2, 4, 8)
     names = {"chain": "chain", "tree:2": "binary tree", "star": "star",
              "independent": "independent agents"}  # fmt: skip
-    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    small = load("equal-computing-boxes").results
+    large = {n: load(f"equal-computing-{n}").results for n in (16, 32)}
+    titles = {64: "64 joint actions", 1024: "1,024 joint actions\n(32 robots: 4,096)"}
+    figure = Figure(figsize=(WIDTH, 4.9), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey="row")
-    for (above, below), budget in zip(panels.T, budgets, strict=True):
+    for (above, below), (budget, title) in zip(panels.T, titles.items(), strict=True):
         for line, (name, label) in enumerate(names.items()):
-            cells = [f"hierarchy, topology={name}, robots={n}, budget={budget}" for n in robots]
-            sizes = [n * (1 + 0.04 * (line - 1.5)) for n in robots]
-            draw_points(above, sizes, [success_of(results, c) for c in cells], line, label)
-            steps = [na.bootstrap(results.means(c, "evaluation", "steps")) for c in cells]
+            cells = {
+                n: (small, f"hierarchy, topology={name}, robots={n}, budget={budget}")
+                for n in (2, 4, 8)
+            }
+            if budget > 64:
+                cells |= {n: (results, name) for n, results in large.items()}
+            sizes = [n * (1 + 0.04 * (line - 1.5)) for n in cells]
+            draw_points(above, sizes, [success_of(*cell) for cell in cells.values()], line, label)
+            steps = [na.bootstrap(steps_to_success(*cell)) for cell in cells.values()]
             draw_points(below, sizes, [tuple(map(float, e)) for e in steps], line, label)
-        above.set(title=f"{budget:,} joint actions", ylim=(-0.03, 1.05))
+        above.set(title=title, ylim=(-0.03, 1.05))
         below.set_xscale("log", base=2)
-        below.set_xticks(robots, [str(n) for n in robots])
-        below.set(xlabel="robots", ylim=(0, None))
+        ticks = (2, 4, 8, *large)
+        below.set_xticks(ticks, [str(n) for n in ticks])
+        below.set(xlabel="robots", ylim=(0, 450))
     panels[0, 0].set_ylabel("success")
     panels[1, 0].set_ylabel("decisions")
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2,
