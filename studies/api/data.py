@@ -296,6 +296,7 @@ class StudyData:
             If a size was run, nothing can be predicted, or the file exists; one line.
         """
         from ..scalability.prediction import predict
+        from .search_methods import method_remarks
 
         if Path(path).exists():
             raise SpecError(f"{path}: exists; a prediction does not replace a file")
@@ -304,7 +305,9 @@ class StudyData:
         file, remarks = predict(results, self.outline.table, name, size, sizes)
         file.write(Path(path))
         count = f"{path}: {len(file.predictions)} predictions, sha256 {file.digest}"
-        return (count, *remarks)
+        with self._sources.active():
+            methods = method_remarks(self.condition_settings(), results, size, sizes)
+        return (count, *remarks, *methods)
 
     def check_prediction(self, path: Place) -> PredictionCheck:
         """Compare the predictions of a file with these results.

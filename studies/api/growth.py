@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from numbers import Integral
 from typing import TYPE_CHECKING
 
 from ...core.plugins.words import expect, expect_each
-from ..cost.profile import search_method
 from ..laws import scaling
-from ..laws.size_axis import SizeAxis
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.results import Results
-from ..trials.arrangement import arrange
+from .search_methods import method_remarks
 from .study import StudyResults
 
 if TYPE_CHECKING:
@@ -85,31 +81,6 @@ def scaling_law(
     law = scaling.scaling_law(
         results, name, phase=phase, size=size, criterion=criterion, predict=predict
     )
-    return Growth(law._replace(remarks=_method_remarks(study, results, size)))
-
-
-def _method_remarks(study: StudyResults, results: Results, size: str | None) -> tuple[str, ...]:
-    """Return a sentence if the search method of a group of conditions changes with size.
-
-    A team of each condition is built to find its method. A study with untrusted files, or one that
-    is known by its table alone, has no methods.
-    """
-    axis = SizeAxis.of(results, size)
-    smallest: dict[tuple[str, str], float] = {}
-    for condition, settings in study.condition_settings().items():
-        if condition in axis.places:
-            group, n = axis.places[condition]
-            with study._sources.active(), suppress(ValueError, ImportError):
-                key = group, search_method(arrange(settings, 0).team)
-                smallest[key] = min(n, smallest.get(key, n))
-    groups = [group for group, _ in smallest]
-    steps = sorted((n, *key) for key, n in smallest.items() if groups.count(key[0]) > 1)
-    changes = dict.fromkeys(f"{method} from {n:g} {axis.name}" for n, _, method in steps)
-    if not changes:
-        return ()
-    changing = dict.fromkeys(group for _, group, _ in steps)
-    head = "" if len(changing) == len({*groups}) else f"{', '.join(changing)}: "
-    return (
-        f"{head}The search method changes within the sizes ({', '.join(changes)}), so that one law "
-        "describes several methods; learner.decision.evaluator sets one for all.",
-    )
+    with study._sources.active():
+        remarks = method_remarks(study.condition_settings(), results, size, predict)
+    return Growth(law._replace(remarks=remarks))

@@ -205,9 +205,13 @@ def test_a_search_method_that_changes_is_remarked(tmp_path) -> None:
     (remark,) = growth.analysis.remarks
     assert "exact from 1 carts, best-response from 7 carts" in remark
     few = {**spec, "sweep": {"scenario.carts": [1, 2, 3]}}
-    assert (
-        na.scaling_law(na.run(few, tmp_path / "b", jobs=1, progress=False)).analysis.remarks == ()
-    )
+    study = na.run(few, tmp_path / "b", jobs=1, progress=False)
+    assert na.scaling_law(study, predict=[4]).analysis.remarks == ()
+    predicted = [*na.scaling_law(study, predict=[12]).analysis.remarks]
+    predicted += study.predict_sizes([12, 10**6], tmp_path / "p.json", "final_distance_m")[-1:]
+    for remark in predicted:
+        assert "exact from 1 carts, best-response from 12 carts" in remark
+    assert len(predicted) == 2
 
 
 def table(path, sizes, of, seeds=4):

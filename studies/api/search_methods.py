@@ -1,0 +1,59 @@
+"""Search methods of the teams of a study that change with size."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+
+from ..cost.profile import search_method
+from ..laws.size_axis import SizeAxis
+from ..results.results import Results
+from ..spec.conditions import ConditionSettings
+from ..spec.tables import merge, nested
+from ..trials.arrangement import arrange
+
+MAX_BUILT = 512
+"""Largest size of a team that is built to find its method; building it takes about a second."""
+
+
+def method_remarks(
+    settings: Mapping[str, ConditionSettings],
+    results: Results,
+    size: str | None,
+    predict: Sequence[int],
+) -> tuple[str, ...]:
+    """Return a sentence if the search method of a group of conditions changes with size.
+
+    A team of each condition and of each predicted size is built to find its method. A study with
+    untrusted files, or one that is known by its table alone, has no methods.
+    """
+    axis = SizeAxis.of(results, size)
+    groups = axis.groups()
+    steps: list[tuple[float, str, str]] = []
+    changing: list[str] = []
+    for group, sizes in groups.items():
+        teams = {n: settings[condition] for condition, n in sizes.items() if condition in settings}
+        for n in map(float, predict if teams else ()):
+            with suppress(ValueError):
+                largest = teams[max(teams)]
+                teams.setdefault(n, _resized(largest, axis.key, min(int(n), MAX_BUILT)))
+        smallest: dict[str, float] = {}
+        for n in sorted(teams):
+            with suppress(ValueError, ImportError):
+                smallest.setdefault(search_method(arrange(teams[n], 0).team), n)
+        if len(smallest) > 1:
+            changing.append(group)
+            steps += [(n, group, method) for method, n in smallest.items()]
+    if not changing:
+        return ()
+    changes = dict.fromkeys(f"{method} from {n:g} {axis.name}" for n, _, method in sorted(steps))
+    head = "" if len(changing) == len(groups) else f"{', '.join(changing)}: "
+    sizes_meant = "the sizes and predictions" if predict else "the sizes"
+    return (
+        f"{head}The search method changes within {sizes_meant} ({', '.join(changes)}), so that one "
+        "law describes several methods; learner.decision.evaluator sets one for all.",
+    )
+
+
+def _resized(settings: ConditionSettings, key: str, n: int) -> ConditionSettings:
+    """Return settings with another size; `ValueError` if they do not allow it."""
+    table = merge(settings.model_dump(mode="json"), nested(key, n))
+    return ConditionSettings.model_validate(table)
