@@ -18,11 +18,12 @@ from ..results.foreign_tables import ROLES, columns_by_role, parse_roles, read_s
 from ..results.joining import combine, join_parts
 from ..results.json_files import read_json
 from ..results.marl_eval import Runs, is_exported_by, read_runs, results_of_runs
-from ..results.results_file import Header
+from ..results.results_file import HEADER, Header
 from ..results.score_tables import SUFFIXES, ScoreTable, read_table, table_of
 from ..results.scores import Better, ScoreResults
 from ..spec.outline import StudyOutline
 from ..spec.tables import SpecTable, TomlTable
+from ..store.database import NoStudyError
 from ..store.durable import read_text
 from ..store.store import Store
 from .comparison import Comparison
@@ -151,9 +152,7 @@ def _open(path: Path) -> Opened:
     if path.suffix in SUFFIXES and not path.is_dir():
         return read_table(path)
     if not path.is_file():
-        with Store.open(path) as store:
-            store.verify()
-            return StudyResults.of(store)
+        return _open_study(path)
     try:
         text = read_text(path)
         file = read_json(text)
@@ -168,6 +167,18 @@ def _open(path: Path) -> Opened:
         raise SpecError(f"{path}: holds no published results: {error}") from None
     remarks = tuple(f"{path}: {note}" for note in kept.notes)
     return StudyResults(kept.outline, kept.results, (), remarks, _sources_beside(path))
+
+
+def _open_study(path: Path) -> StudyResults:
+    """Return the results of a study's folder; a refusal names a file of results in another one."""
+    try:
+        with Store.open(path) as store:
+            store.verify()
+            return StudyResults.of(store)
+    except NoStudyError as error:
+        files = [f for f in path.glob("*") if f.suffix in (*SUFFIXES, ".json") and f.name != HEADER]
+        hint = f"; name a file of results, as {min(files)}" if files else ""
+        raise NoStudyError(f"{error}{hint}") from None
 
 
 def _sources_beside(path: Path | None) -> Sources:

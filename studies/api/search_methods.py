@@ -46,10 +46,9 @@ def method_remarks(
         return ()
     changes = dict.fromkeys(f"{method} from {n:g} {axis.name}" for n, _, method in sorted(steps))
     head = "" if len(changing) == len(groups) else f"{', '.join(changing)}: "
-    sizes_meant = "the sizes and predictions" if predict else "the sizes"
     return (
-        f"{head}The search method changes within {sizes_meant} ({', '.join(changes)}), so that one "
-        "law describes several methods; learner.decision.evaluator sets one for all.",
+        f"{head}The search method changes with size ({', '.join(changes)}), so that one law "
+        "describes several methods; learner.decision.evaluator sets one for all.",
     )
 
 

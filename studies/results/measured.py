@@ -133,7 +133,10 @@ def _trial_numbers(
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
     column = next((c for c in columns if name in names[c]), None)
     if column is None:
-        raise SpecError(f"measure = {name!r}: {closest(name, {*others, *columns})}")
+        known = closest(name, {*others, *columns})
+        if not results.phases and name == RETURN.name:  # the measure by default
+            raise SpecError(f"measure: name one, because there are no episodes; {known}")
+        raise SpecError(f"measure = {name!r}: {known}")
     measure, factor = describe_number(column)
     of_trials = {
         c: pd.DataFrame(factor * own[column], results.seeds(c))

@@ -31,6 +31,8 @@ NAMED_RUNS = 3
 """Largest number of runs that a note lists by name."""
 WHOLE = re.compile(r"0|[1-9][0-9]{0,17}", re.ASCII)
 """A whole number in its one usual spelling."""
+NUMBERS_WITHIN = re.compile(r"((?:(?<!\w)[+-])?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", re.ASCII)
+"""Numbers within a label; a hyphen after a letter or a digit is no sign."""
 UNNAMED = "unnamed run "
 """Prefix of the names of runs that have none."""
 Better = Literal["higher", "lower"]
@@ -63,14 +65,18 @@ def name_key(name: object) -> tuple[bool, int, object]:
 
 
 def sort_labels(labels: Iterable[str]) -> list[str]:
-    """Return labels sorted by size if all are numbers, else by their text.
+    """Return labels sorted by their text, in which numbers are sorted by size.
 
-    >>> sort_labels(["16", "2", "4"]), sort_labels(["star", "chain", "2"])
-    (['2', '4', '16'], ['2', 'chain', 'star'])
+    >>> sort_labels(["carts=16", "carts=2"]), sort_labels(["star", "0.5", "-1", "chain"])
+    (['carts=2', 'carts=16'], ['-1', '0.5', 'chain', 'star'])
     """
-    known = list(labels)
-    are_numbers = all(NUMBER.fullmatch(text) for text in known)
-    return sorted(known, key=lambda text: (float(text) if are_numbers else 0.0, text))
+    return sorted(labels, key=lambda label: (_parts(label), label))
+
+
+def _parts(label: str) -> list[tuple[bool, float, str]]:
+    """Return the numbers of a label and the text between them."""
+    parts = enumerate(NUMBERS_WITHIN.split(label))
+    return [(False, float(p), "") if k % 2 else (True, 0.0, p) for k, p in parts if p]
 
 
 def plain_levels(levels: pd.Series) -> pd.Series:

@@ -131,12 +131,23 @@ def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str | N
     return hashlib.sha256(content).hexdigest()
 
 
-def sha256(path: Place) -> str | None:
-    """Return the SHA-256 of a file; None if it cannot be read."""
+def read_checked(path: Place, digest: str | None) -> bytes:
+    """Return the content of a file that has a SHA-256, unless that is unknown.
+
+    Raises
+    ------
+    SpecError
+        If the file is missing, is none, cannot be read, or has another content.
+    """
     try:
-        return hashlib.sha256(read_bytes(path)).hexdigest()
-    except OSError:
-        return None
+        content = read_bytes(path)
+    except FileNotFoundError:
+        raise SpecError(f"{path}: is missing") from None
+    except OSError as error:
+        raise SpecError(f"{path}: {error.strerror or error}") from None
+    if digest not in (None, hashlib.sha256(content).hexdigest()):
+        raise SpecError(f"{path}: is damaged")
+    return content
 
 
 def read_recording(path: Path, name: str, digest: str | None = None) -> Recording:
@@ -161,18 +172,12 @@ def read_recording(path: Path, name: str, digest: str | None = None) -> Recordin
     import numpy as np
 
     prefix = f"{name}/"
+    content = read_checked(path, digest)
     try:
-        content = read_bytes(path)
-        if digest not in (None, hashlib.sha256(content).hexdigest()):
-            raise SpecError(f"{path}: is damaged")
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             keys = [key for key in arrays.files if key.startswith(prefix)]
             recording = {key.removeprefix(prefix): arrays[key] for key in keys}
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such file") from None
-    except OSError as error:
-        raise SpecError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
         raise SpecError(f"{path}: is damaged") from None
     if not recording:
         raise NotRecordedError(f"{path}: holds no recording {name!r}")

@@ -72,7 +72,9 @@ class Store:
         """
         path = directory / DATABASE
         if not path.exists():
-            raise NoStudyError(f"{directory}: holds no study (no {DATABASE})")
+            above = directory.parent
+            hint = f"; {above} holds one" if (above / DATABASE).exists() else ""
+            raise NoStudyError(f"{directory}: holds no study (no {DATABASE}){hint}")
         with open_to_read(path) as connection:
             yield cls(directory, connection, integrity.check_study(path, connection))
 
@@ -282,10 +284,12 @@ class Store:
             "WHERE recording_sha256 IS NOT NULL"
         )
         for identity, condition, seed, written in self._db.execute(query).fetchall():
-            path = f"{folder}/{identity}.npz"
-            if identity not in damaged and (digest := durable.sha256(path)) != written:
-                problem = "is missing" if digest is None else "is damaged"
-                damaged[identity] = f"{path}: {problem} ({condition}, seed {seed})"
+            if identity in damaged:
+                continue
+            try:
+                durable.read_checked(f"{folder}/{identity}.npz", written)
+            except SpecError as error:
+                damaged[identity] = f"{error} ({condition}, seed {seed})"
         return damaged
 
     def save(

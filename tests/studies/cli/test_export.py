@@ -153,7 +153,7 @@ def test_a_table_in_every_form(study, form, capsys, monkeypatch):
     [
         (
             ["{study}", "--columns", "succes"],
-            "columns: the table has no 'succes'; did you mean 'success last",
+            "columns: the table has no 'succes'; it has 'training success', ",
         ),
         (["{study}/nothing"], "nothing: holds no study"),
         (["{study}/study.toml"], "study.toml: holds no published results"),
@@ -163,6 +163,16 @@ def test_what_has_no_table_is_refused(study, arguments, said, capsys):
     assert main(["table", *(a.format(study=study) for a in arguments)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert said in line
+
+
+def test_a_folder_of_exported_files_is_refused_with_what_to_name(study, tmp_path, capsys):
+    for folder in (study / "export", tmp_path):
+        assert main(["export", str(study), "--out", str(folder)]) == 0
+        capsys.readouterr()
+        assert main(["table", str(folder)]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert str(folder / "episodes.csv") in line
+        assert (f"; {study} holds one" in line) == (folder != tmp_path)
 
 
 def test_parquet_holds_the_same_with_types(study, tmp_path, capsys):

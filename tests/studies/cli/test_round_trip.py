@@ -97,6 +97,8 @@ def test_exported_trials_give_the_verdict_of_the_study(
     assert "2 of" in comparison.remarks[0]
     with pytest.raises(SpecError, match=r"measure = 'success': known: .*seconds\.total"):
         na.load(tmp_path / "trials.csv").compare(measure="success")
+    with pytest.raises(SpecError, match=r"^measure: name one.* seconds\.total"):
+        na.load(tmp_path / "trials.csv").compare()
     assert main(["table", str(tmp_path / "trials.csv")]) == 2
     assert "needs episodes" in capsys.readouterr().err
     numbers = load_study(kept.outline.study).NUMBERS

@@ -11,9 +11,11 @@ import pytest
 
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.report import page
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.database import DATABASE, SPEC_FILE
+from nested_agents.studies.store.store import Store
 from nested_agents.studies.store.writer import LOCK
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.runner import save
@@ -66,7 +68,8 @@ def test_what_is_no_file_is_not_read(make, tmp_path, monkeypatch):
     for read in (durable.read_bytes, durable.read_text, durable.check_file):
         with pytest.raises(OSError, match=ODD[make]):
             read(tmp_path / "odd")
-    assert durable.sha256(tmp_path / "odd") is None
+    with pytest.raises(SpecError, match=f"odd: {ODD[make]}"):
+        durable.read_checked(tmp_path / "odd", "digest")
 
 
 @pytest.mark.parametrize("make", ODD)
@@ -106,6 +109,9 @@ def test_a_recording_that_is_no_file_is_damaged_and_never_waited_for(
     monkeypatch.setattr(page, "hierarchy_pictures", lambda store: [])
     for recording in (study / "recordings").glob("*.npz"):
         make(recording)
+    with Store.open(study) as store:
+        assert all(f".npz: {ODD[make]} (" in line for line in store.damage().values())
+        assert store.damage()
     assert main(["report", str(study)]) == 0
     assert "Traceback" not in "".join(capsys.readouterr())
     assert "the recording is missing or damaged" in (study / "report.html").read_text()

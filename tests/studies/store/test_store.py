@@ -116,7 +116,7 @@ def test_a_recording_that_cannot_be_read_is_named(finished):
         with pytest.raises(SpecError, match="is damaged"):
             store.recording(trial.identity, "last")
         path.unlink()
-        with pytest.raises(SpecError, match="no such file"):
+        with pytest.raises(SpecError, match="is missing"):
             store.recording(trial.identity, "last")
 
 
