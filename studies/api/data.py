@@ -26,6 +26,7 @@ from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
 from ..results.comparison import compare_conditions, missing_reference, power_with_first
 from ..results.joining import join_sizes
+from ..results.measured import default_measure
 from ..results.notation import wrapped
 from ..results.results import Results
 from ..spec.conditions import ConditionSettings
@@ -150,7 +151,8 @@ class StudyData:
             ``condition``: compares all conditions with the first.
         measure
             Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials. By
-            default the first measure: success, or the return if nothing is a success.
+            default the first measure: success, or the return if nothing is a success. Of a study
+            of failures it is ``recovered``, unless a phase is named.
         phase
             Phase of the episodes; by default ``evaluation``.
         reference
@@ -161,10 +163,11 @@ class StudyData:
         SpecError
             If there is no such key, measure, phase or reference.
         """
-        default_measure, default_by = self._defaults
+        own_measure, default_by = self._defaults
         by = by or default_by
         key = None if by == "condition" else by
-        name = measure or default_measure or self.results.main.name
+        usual = default_measure(self.results) if phase is None else self.results.main.name
+        name = measure or own_measure or usual
         compared = compare_conditions(self.results, name, phase, key, reference)
         missing = missing_reference(self.results) if reference is None and key is None else []
         return Comparison(compared, (*missing, *self._of_controls, *self.remarks))

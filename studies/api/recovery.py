@@ -22,7 +22,8 @@ from ...scenarios.library_types import Data, Environment
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
-from ..results.recovery import BLOCK, REGAINED, recovery
+from ..results.notation import wrapped
+from ..results.recovery import BLOCK, LOWER_BOUND, REGAINED, recovery
 from ..results.statistics import bootstrap, exactly, rate
 
 Policy: TypeAlias = Any
@@ -115,9 +116,10 @@ class RecoveryTable(Report):
         return tabulate([course.summary() for course in self.courses])
 
     @property
-    def notes(self) -> tuple[str]:
+    def notes(self) -> tuple[str, ...]:
         """Meaning of the columns."""
-        return (f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes.",)
+        levels = f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes."
+        return (levels, *wrapped(LOWER_BOUND))
 
 
 def recovery_table(

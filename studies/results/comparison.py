@@ -30,10 +30,10 @@ from .differences import (
     differences,
     select_shared,
 )
-from .measured import title_of, values_by_seed, values_of
+from .measured import default_measure, title_of, values_by_seed, values_of
 from .notation import wrapped
 from .power_text import power_lines
-from .recovery import RECOVERY
+from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME
 from .results import STEPS, Results, row_means
 from .statistics import Array, Estimate, exactly
 
@@ -96,6 +96,8 @@ class ComparisonTable(NamedTuple):
         lines += unpaired_lines(text for group in self.groups for text in group.left_out)
         if self.measure.name in RECOVERY:
             lines += self._without_success()
+        if self.measure.name in (TIME.name, DECISIONS.name):
+            lines += wrapped(LOWER_BOUND)
         if self.measure.gathering == "sum" and self.measure.better == "lower":
             lines += wrapped(f"{self.title}: a sum, which is lower in episodes that end early.")
         compared = {c for group in self.groups for c in group.members.values()}
@@ -233,7 +235,7 @@ def power_with_first(results: Results) -> tuple[str, ...]:
 
     They agree with those of `compare_conditions`, which takes seconds for thousands of seeds.
     """
-    measure, values, phase = values_of(results, results.main.name)
+    measure, values, phase = values_of(results, default_measure(results))
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= MIN_RUNS]

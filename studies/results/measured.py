@@ -1,6 +1,7 @@
 """Values of a measure by condition and seed, for comparisons and laws of growth."""
 
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from ...core.plugins.words import closest
 from ..errors import SpecError
 from .differences import BySeed
 from .notation import MIN_LARGEST
-from .recovery import RECOVERY, recovery_by_seed
+from .recovery import RECOVERED, RECOVERY, recovery_by_seed
 from .results import SECONDS, STEPS, Results, describe_number, row_means
 from .scores import LAST_STEP
 
@@ -42,6 +43,23 @@ def usual_phase(results: Results, measure: str) -> str:
     raise SpecError(f"phase: name one, known: {', '.join(results.phases)}")
 
 
+def default_measure(results: Results) -> str:
+    """Return the measure that is compared by default: recovery, or without it `Results.main`.
+
+    Training with a failure has episodes before and after it, of which `Results.main` is the mean.
+    """
+    if _has_failed(results):
+        with suppress(SpecError):  # no seed succeeded before the failure
+            recovery_by_seed(results, RECOVERED.name, "training")
+            return RECOVERED.name
+    return results.main.name
+
+
+def _has_failed(results: Results) -> bool:
+    """Return whether a trained condition has a failure during training."""
+    return any("onset" in results.numbers(c) for c in results.of_phase("training"))
+
+
 def values_of(
     results: Results, name: str, phase: str | None = None
 ) -> tuple[Measure, dict[str, BySeed], str]:
@@ -67,8 +85,7 @@ def values_by_seed(
         raise SpecError("no trial has finished")
     if phase is not None and phase not in results.phases:
         raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
-    has_failed = any("onset" in results.numbers(c) for c in results.of_phase("training"))
-    recovery = RECOVERY if has_failed else {}
+    recovery = RECOVERY if _has_failed(results) else {}
     measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
     titles = {m.heading: m.name for m in reversed([*measures.values()])}
     titles |= {title: m.name for m in recovery.values() for title in (m.heading, m.title)}

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import BoolArray, pd
 from ..errors import SpecError
-from .results import STEPS, Results
+from .results import KEPT, STEPS, Results
 from .statistics import Array
 
 BLOCK = 5
@@ -28,6 +28,11 @@ TIME = Measure("recovery_time", "recovery time", "episodes", better="lower", lea
 DECISIONS = Measure("recovery_decisions", "decisions to recovery", better="lower", least=0.0)
 RECOVERY = {measure.name: measure for measure in (RECOVERED, LOSS, TIME, DECISIONS)}
 """Measures of a trial with a failure, by name."""
+LOWER_BOUND = (
+    "A seed that never recovers counts with all its episodes from the failure on: mean recovery "
+    "times are lower bounds."
+)
+"""Remark on the means of `TIME` and `DECISIONS`."""
 
 
 def recovery(shortfall: ArrayLike, allowed: ArrayLike, last_onset: int = 0) -> tuple[Array, Array]:
@@ -153,8 +158,10 @@ def recovery_by_seed(
     Raises
     ------
     SpecError
-        If no seed had success before a failure.
+        If the phase is another one, or no seed had success before a failure.
     """
+    if phase not in ("training", KEPT):
+        raise SpecError(f"phase = {phase!r}: measure = {name!r} is of training or {KEPT!r}")
     courses = {
         condition: failure_course(results, condition, phase)
         for condition in results.of_phase(phase)

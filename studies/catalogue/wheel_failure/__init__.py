@@ -5,7 +5,8 @@ Agents that leave (``kind = "left"`` of ``topology.failures``) also count as a f
 Training continues through the failure. At its onset the team is copied, and the copy continues with
 fixed weights under the same initial states and exploration. A sweep over
 ``learner.self_model.enabled`` gives four cases of adaptation: nothing, the weights, the self-model,
-which corrects predictions, or both.
+which corrects predictions, or both. Without that sweep, the share of seeds that recover in training
+is compared with that of the first condition.
 
 Levels are success rates over `BLOCK` episodes: before the failure, just after its onset, after its
 end if it ends, and at the end of training. Recovery and loss are relative to the level of each
@@ -29,7 +30,15 @@ from ....core.plugins.settings import FailureSpan
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, Summary, judged, mean_estimate
 from ...results.differences import Pair
-from ...results.recovery import BLOCK, FailureCourse, bounded, failure_course
+from ...results.notation import wrapped
+from ...results.recovery import (
+    BLOCK,
+    LOWER_BOUND,
+    RECOVERED,
+    FailureCourse,
+    bounded,
+    failure_course,
+)
 from ...results.results import KEPT, Results
 from ...results.statistics import Array, bootstrap, exactly, rate
 from ...spec.spec import Spec
@@ -166,13 +175,23 @@ class Course(NamedTuple):
 def analyse(results: Results) -> Analysis:
     """Estimate and compare with 95% intervals, with seeds as the unit of sampling.
 
-    The compared measure is success at the end, relative to the case without adaptation.
+    If self-models are swept, success at the end is compared with the case without adaptation;
+    otherwise recovery in training is compared with that of the first condition.
     """
     courses = courses_of(results)
-    gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
-    notes = ["Rows: fault, then the parts that adapt to it."] if courses else []
+    if not courses:
+        return Analysis(())
+    if any(course.adapts == "nothing" for course in courses):
+        notes = ["Rows: condition, then the parts that adapt to its failure."]
+        gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
+    else:
+        notes = ["Rows: condition, then whether training continues or weights are kept."]
+        pairs = {RECOVERED.heading: _recoveries(courses)}
+        gains, lines = judged(pairs, courses[0].fault, RECOVERED)
     if not all(course.measured.had_success.all() for course in courses):
         notes += _unmeasured(courses)
+    if any(course.measured.had_success.any() for course in courses):
+        notes += wrapped(LOWER_BOUND)
     if any(course.end is not None for course in courses):
         notes.append("Recovery after the end of a failure is not adaptation.")
     table = tuple(course.summary for course in courses)
@@ -241,6 +260,18 @@ def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
     for (fault, adapts), end in ends.items():
         if adapts != "nothing" and (fault, "nothing") in ends:
             yield f"{fault}, {adapts}", AT_END, end, ends[fault, "nothing"]
+
+
+def _recoveries(courses: Sequence[Course]) -> Iterator[Pair]:
+    """Yield the recovery of each team that learns, paired with that of the first."""
+    recovered = {
+        c.fault: pd.Series(c.measured.measured[RECOVERED.name], c.measured.seeds).dropna()
+        for c in courses
+        if c.adapts == "training"
+    }
+    (_, first), *others = recovered.items()
+    for fault, own in others:
+        yield fault, RECOVERED.heading, own, first
 
 
 def draw(analysis: Analysis) -> Figures:

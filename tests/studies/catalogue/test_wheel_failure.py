@@ -20,7 +20,13 @@ from nested_agents.studies.catalogue.wheel_failure import (
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.comparison import compare_conditions
-from nested_agents.studies.results.recovery import RECOVERY, FailureCourse, failure_course
+from nested_agents.studies.results.measured import default_measure
+from nested_agents.studies.results.recovery import (
+    LOWER_BOUND,
+    RECOVERY,
+    FailureCourse,
+    failure_course,
+)
 from nested_agents.studies.results.results import KEPT
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session, run_trial
@@ -84,6 +90,37 @@ def test_recovery_is_compared_from_the_failure_on() -> None:
         compare_conditions(results, "recovered", "evaluation")
 
 
+def test_hierarchies_are_compared_with_the_first_by_recovery() -> None:
+    made = wheel_failure(ENDS)
+    for columns in made.columns.values():
+        del columns[module.SWEPT]
+    results = made.frames()
+    analysis = analyse(results)
+    assert results.main.name == "success", "a mean over episodes before and after the failure"
+    assert default_measure(results) == "recovered"
+    compared = compare_conditions(results, default_measure(results)).differences
+    assert analysis.differences["recovered"] == tuple(
+        replace(d, measure="recovered") for d in compared
+    )
+    assert [d.condition for d in compared] == [*made.columns][1:]
+    assert any(note.startswith("Power:") for note in analysis.notes)
+
+
+def test_recovery_is_no_measure_of_an_evaluation() -> None:
+    made = wheel_failure(ENDS)
+    made.evaluation = made.training
+    with pytest.raises(SpecError, match=r"phase = 'evaluation'.*'weights kept'"):
+        compare_conditions(made.frames(), "recovered", "evaluation")
+
+
+def test_mean_recovery_times_are_said_to_be_lower_bounds() -> None:
+    results = wheel_failure(ENDS).frames()
+    compared = {name: compare_conditions(results, name).notes for name in RECOVERY}
+    notes = {"study": analyse(results).notes, **compared}
+    said = {name for name, lines in notes.items() if LOWER_BOUND in " ".join(map(str.strip, lines))}
+    assert said == {"study", "recovery_time", "recovery_decisions"}
+
+
 def test_recovery_is_no_measure_where_nothing_fails() -> None:
     results = ablation({"a": 0.5, "b": 0.5}).frames()
     with pytest.raises(SpecError, match="measure = 'recovered'"):
@@ -143,6 +180,7 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
     assert "not measured for seeds without success before the failure: fault:" in text
     with pytest.raises(SpecError, match="'recovered': no seed succeeded before a failure began"):
         compare_conditions(results.frames(), "recovered")
+    assert default_measure(results.frames()) == "success"
 
 
 def test_a_comparison_names_the_seeds_without_success_before_the_failure() -> None:
@@ -211,7 +249,7 @@ def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) ->
     if faults is None:  # nothing is said of self-models
         assert {adapts for _, adapts in found} == {"training", KEPT}
         assert {fault for fault, _ in found} == set(results.training)
-        assert analysis.differences[AT_END] == ()
+        assert AT_END not in analysis.differences
     else:
         cases = ("nothing", "weights", "self-model", "both")
         assert found == [(fault, adapts) for fault in faults for adapts in cases]
