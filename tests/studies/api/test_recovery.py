@@ -60,7 +60,7 @@ def test_a_fault_that_ends() -> None:
     assert (random.faulty == again.courses[1].faulty).all()
     lines = str(table).splitlines()
     assert max(map(len, lines)) <= 80
-        assert any(line.startswith(f"Levels are mean returns of {BLOCK} ") for line in lines)
+    assert any(line.startswith(f"Levels are mean returns of {BLOCK} ") for line in lines)
 
 
 def test_a_policy_may_be_told_that_a_run_begins() -> None:
