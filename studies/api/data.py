@@ -326,9 +326,14 @@ class StudyData:
         return check(file, self.results_by_size(file.size), self.outline.table)
 
     def __str__(self) -> str:
-        return "\n".join([str(self.table()), "", *self.notes])
+        try:
+            return "\n".join([str(self.table()), "", *self.notes])
+        except SpecError as error:  # the analysis needs what these results lack
+            return str(error)
 
     __repr__ = __str__
 
-    def _repr_html_(self) -> str:
-        return f"<h4>{escape(self.outline.study)}</h4>{self.table().html}"
+    def _repr_html_(self) -> str | None:
+        with suppress(SpecError):  # notebooks then show the text
+            return f"<h4>{escape(self.outline.study)}</h4>{self.table().html}"
+        return None

@@ -195,7 +195,10 @@ def _results_of(
     if len(runs) > 1 and len(joined) == sum(map(len, runs.values())):
         runs = {next(iter(runs)): joined}
     loaded: dict[Path, StudyResults] = {}
+    with_episodes = {_trials_beside(path) for path in opened}
     for path, own in opened.items():
+        if path in with_episodes:
+            continue
         if isinstance(own, StudyResults):
             loaded[path] = own
         elif isinstance(own, ScoreTable):
@@ -203,6 +206,14 @@ def _results_of(
         elif path in runs:
             loaded[path] = _of_runs(runs[path], path, better)
     return loaded
+
+
+def _trials_beside(path: Path) -> Path | None:
+    """Return the exported trials of a table of exported episodes, if they are there unchanged."""
+    header = Header.in_folder_of(path)
+    trials = path.with_stem("trials")
+    is_listed = path.stem == "episodes" and header is not None and path.name in header.files
+    return trials if is_listed and header is not None and header.has_unchanged(trials) else None
 
 
 def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better) -> StudyResults:
@@ -213,7 +224,9 @@ def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better
         if is_exported(table, is_listed=is_listed) and roles.keys() <= {"score"}:
             _check_better(better)
             measure = next(iter(map(str, roles.values())), None)
-            return _of_scores(read_export(table, header), path, header, measure)
+            beside = _trials_beside(path) if path else None
+            trials = read_table(beside) if beside else None
+            return _of_scores(read_export(table, header, trials), path, header, measure)
         columns = columns_by_role(roles, table.columns)
         read = read_scores(table, columns, better)
     notes = header.remarks(path) if header and path and is_listed else ()

@@ -157,7 +157,8 @@ def analyse_as(name: str, results: Results) -> Any:
             if needed not in results.numbers(condition):
                 raise SpecError(
                     f"study = {name!r}: needs {needed} of every trial, which those of "
-                    f"{condition!r} have not measured; allowed for episodes alone: learning-curve"
+                    f"{condition!r} have not measured; of an exported study it is in the table of "
+                    "trials, in the same folder; for episodes alone: --as learning-curve"
                 )
     analysis = study.analyse(results)
     same = identity_lines(results.identical)

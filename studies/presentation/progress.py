@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from shutil import get_terminal_size
-from textwrap import fill
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from ...core.plugins.printing import printable
@@ -80,8 +80,14 @@ class Terminal(Observer):
         """Print a note once."""
         if line not in self._noted:
             self._noted.add(line)
-            width = get_terminal_size().columns if sys.stderr.isatty() else len(line)
-            say(line if len(line) <= width else fill(line, width, subsequent_indent="  "))
+            lines = wrap(
+                line,
+                get_terminal_size().columns,
+                subsequent_indent="  ",
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
+            say("\n".join(lines))
 
     def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
         """Show progress, failures and remaining time."""

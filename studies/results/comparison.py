@@ -282,7 +282,8 @@ def _groups(
     keys = dict.fromkeys(key for c in conditions for key in columns[c])
     key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
     if by is not None and key is None:
-        raise SpecError(f"by = {by!r}: {closest(by, keys)}")
+        without = "without it, all conditions are compared with the first"
+        raise SpecError(f"by = {by!r}: {closest(by, keys)}; {without}")
     groups: dict[str, Members] = {}
     known = {}
     for c in conditions:

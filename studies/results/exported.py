@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from ...core.numerics import pd
 from ..errors import SpecError
 from ..spec.tables import SpecTable
-from .results import DONE, TRIAL_COLUMNS, assemble
+from .results import DONE, TRIAL_COLUMNS, Results, assemble
 from .results_file import Header
 from .score_tables import ScoreTable
 from .scores import (
@@ -38,8 +38,19 @@ def is_exported(table: ScoreTable, *, is_listed: bool = False) -> bool:
     return not is_other and ({*EPISODES} <= names or {*TRIALS} <= names)
 
 
-def read_export(table: ScoreTable, header: Header | None) -> ScoreResults:
+def read_export(
+    table: ScoreTable, header: Header | None, trials: ScoreTable | None = None
+) -> ScoreResults:
     """Return the results of an exported table, in any order of its rows and columns.
+
+    Parameters
+    ----------
+    table
+        The table, of episodes or of trials.
+    header
+        Description of the study.
+    trials
+        Exported trials of a table of episodes, whose numbers are added.
 
     Raises
     ------
@@ -69,7 +80,20 @@ def read_export(table: ScoreTable, header: Header | None) -> ScoreResults:
     missing = [m.name for m in header.measures if m.name not in table.columns]
     measures = [m for m in header.measures if m.name not in missing]
     notes = [f"no column {', '.join(missing)}, which study.json has"] * bool(missing)
-    return ScoreResults(results_of(scores, conditions, measures), tuple(notes))
+    results = results_of(scores, conditions, measures)
+    if trials is not None:
+        results = _with_numbers(results, read_export(trials, header).results)
+    return ScoreResults(results, tuple(notes))
+
+
+def _with_numbers(episodes: Results, trials: Results) -> Results:
+    """Return results of episodes with the numbers of their whole trials."""
+    known = trials.trials.drop(columns=["state", *episodes.trials], errors="ignore")
+    keys = ["condition", "seed"]
+    numbers = known.assign(**{key: trials.trials[key] for key in keys})
+    rows = episodes.trials.merge(numbers, how="left", on=keys)
+    own = episodes.phases, episodes.columns, episodes.measures, ()
+    return assemble([episodes.episodes], [rows], *own)
 
 
 def _read_trials(

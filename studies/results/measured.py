@@ -90,6 +90,11 @@ def values_by_seed(
     titles = {m.heading: m.name for m in reversed([*measures.values()])}
     titles |= {title: m.name for m in recovery.values() for title in (m.heading, m.title)}
     name = titles.get(name, name)
+    if name in RECOVERY and not recovery:
+        raise SpecError(
+            f"measure = {name!r}: needs episodes and a failure (onset) in training; the two tables "
+            "of an exported study, episodes and trials, must be in one folder"
+        )
     if name in recovery:
         measure, values = recovery_by_seed(results, name, phase or "training")
         return measure, {c: own.to_frame() for c, own in values.items()}, ""

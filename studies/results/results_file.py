@@ -212,13 +212,18 @@ class Header(BaseModel):
         is_other = self.results_version != RESULTS_VERSION
         return (*[other] * is_other, *[CHANGED] * self._is_changed)
 
+    def has_unchanged(self, path: Path) -> bool:
+        """Return whether an exported file is there and as it was exported."""
+        digest = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+        return self.files.get(path.name) == digest
+
     def remarks(self, path: Path) -> tuple[str, ...]:
         """Return the notes, and whether an exported file has been changed."""
         notes = tuple(f"{HEADER} {note}" if note == CHANGED else note for note in self.notes)
         known = self.files.get(path.name)
         if known is None and self.files:
             return (*notes, f"is not among the files that {HEADER} lists")
-        if known is None or known == hashlib.sha256(path.read_bytes()).hexdigest():
+        if known is None or self.has_unchanged(path):
             return notes
         return (*notes, f"{CHANGED}, says {HEADER}")
 
