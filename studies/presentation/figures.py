@@ -114,9 +114,13 @@ def draw_curve(
     """Draw estimates ``(n,)`` over `x` as a line with a band of intervals.
 
     The edges of the band have the dashes of the line, which tell bands apart where they overlap.
+    A single estimate is a marker with a bar, above the lines of others.
     """
     places = np.asarray(x)
     style = look(index)
+    if len(places) == 1:
+        kwargs = {"marker": "o", "zorder": 3, **kwargs}
+        axes.vlines(places, estimate.low, estimate.high, color=style["color"], lw=1.0)
     axes.fill_between(places, estimate.low, estimate.high, color=style["color"], alpha=alpha, lw=0)
     for edge in (estimate.low, estimate.high):
         axes.plot(places, edge, **style, lw=0.6, alpha=0.7)

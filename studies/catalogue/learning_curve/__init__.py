@@ -151,10 +151,9 @@ def draw(analysis: Analysis) -> Figures:
         complete = {c: v[:, ~np.isnan(v).any(axis=0)] for c, v in training.items()}
         for condition, curve in curves_of(measured, complete).items():
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
-            marker = "o" if len(curve.value) == 1 else None
             band = 0.12 if curve.value.any() else 0.0  # those that never succeed share one band
             index = list(seeds).index(condition)
-            f.draw_curve(axes, episodes, curve, index, alpha=band, marker=marker)
+            f.draw_curve(axes, episodes, curve, index, alpha=band)
         axes.set_title(measured.heading, loc="left")
         if measured.is_rate:
             f.as_rates(axes)
