@@ -14,7 +14,7 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics import pd
 from ..errors import WIDTH
 from .differences import MIN_RUNS, Difference, Pair, count_unpaired, differences
-from .notation import wrapped
+from .notation import listed, wrapped
 from .permutation_tests import LEVEL
 from .power_text import independent_power_lines, power_lines
 from .results import STEPS, Results, row_means
@@ -91,11 +91,14 @@ def phases_of(results: Results) -> dict[str, str]:
     }
 
 
+UNPAIRED = "Left out of differences, because they have no partner"
+"""Beginning of the remark that counts runs by pairs of conditions."""
+
+
 def left_out_lines(results: Results, phase: str) -> list[str]:
     """Return lines that name the conditions without episodes of a phase."""
     others = [c for c in results.conditions if not results.has(c, phase)]
-    names = "; ".join(others)
-    return wrapped(f"Not in the table, because they have no {phase}: {names}.") if others else []
+    return listed(f"Not in the table, because they have no {phase}", others)
 
 
 Figures: TypeAlias = "dict[str, Figure]"
@@ -220,15 +223,7 @@ def judged(
         if len(own.index.intersection(base.index)) >= MIN_RUNS
         and (count := count_unpaired(own.index, base.index))
     )
-    return compared, lines + unpaired_lines(unpaired)
-
-
-def unpaired_lines(counts: Iterable[str]) -> list[str]:
-    """Return lines on runs without a partner, counted for each pair of conditions."""
-    text = "; ".join(counts)
-    return (
-        wrapped(f"Left out of differences, because they have no partner: {text}.") if text else []
-    )
+    return compared, lines + listed(UNPAIRED, unpaired)
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:

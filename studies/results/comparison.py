@@ -13,14 +13,7 @@ from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import SpecTable, aliases, label, named
-from .analysis import (
-    NOTHING,
-    Summary,
-    identity_lines,
-    mean_estimate,
-    unpaired_lines,
-    verdicts,
-)
+from .analysis import NOTHING, UNPAIRED, Summary, identity_lines, mean_estimate, verdicts
 from .differences import (
     MIN_RUNS,
     BySeed,
@@ -31,7 +24,7 @@ from .differences import (
     select_shared,
 )
 from .measured import default_measure, title_of, values_by_seed, values_of
-from .notation import wrapped
+from .notation import listed, wrapped
 from .power_text import power_lines
 from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME
 from .results import STEPS, Results, row_means
@@ -93,7 +86,7 @@ class ComparisonTable(NamedTuple):
             head = ": ".join(filter(None, (group.setting, self.title)))
             groups[f"{head}, minus that of {group.reference}"] = group.differences
         lines = verdicts(groups, self.measure, self.title)
-        lines += unpaired_lines(text for group in self.groups for text in group.left_out)
+        lines += listed(UNPAIRED, (text for group in self.groups for text in group.left_out))
         if self.measure.name in RECOVERY:
             lines += self._without_success()
         if self.measure.name in (TIME.name, DECISIONS.name):
@@ -102,9 +95,7 @@ class ComparisonTable(NamedTuple):
             lines += wrapped(f"{self.title}: a sum, which is lower in episodes that end early.")
         compared = {c for group in self.groups for c in group.members.values()}
         others = [c for c in self.results.conditions if c not in compared]
-        if others:
-            names = "; ".join(others)
-            lines += wrapped(f"Not compared, because they have no {self.title}: {names}.")
+        lines += listed(f"Not compared, because they have no {self.title}", others)
         values = [own for group in self.groups for own in group.values.values()]
         if self.measure.name == SUCCESS.name and not any(own.any() for own in values):
             lines += wrapped(f"No run has any {self.title}.")
@@ -118,8 +109,7 @@ class ComparisonTable(NamedTuple):
                 total = len(self.results.seeds(condition))
                 if missing := total - len(group.values[name]):
                     texts.append(f"{condition}, {missing} of {total}")
-        text = f"Seeds without success before the failure, left out: {'; '.join(texts)}."
-        return wrapped(text) if texts else []
+        return listed("Seeds without success before the failure, left out", texts)
 
 
 def compare_conditions(

@@ -5,6 +5,7 @@ Every number that a reader sees is rounded here: ``0.82 [0.55, 0.95]``, ``95%``,
 
 import math
 import re
+from collections.abc import Iterable
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 from textwrap import wrap
 
@@ -121,6 +122,12 @@ WHOLE = re.compile(r"[-+]?\d\S* \[[^]]*\]|\(\S+ unadjusted\)|\w+ [=<] \S+|\d+ se
 def whole(text: str) -> str:
     """Return text with no-break spaces within numbers, see `WHOLE`."""
     return WHOLE.sub(lambda part: part[0].replace(" ", "\N{NO-BREAK SPACE}"), text)
+
+
+def listed(text: str, names: Iterable[str]) -> list[str]:
+    """Return a remark that ends with names, in lines; no line without names."""
+    joined = "; ".join(names)
+    return wrapped(f"{text}: {joined}.") if joined else []
 
 
 def wrapped(text: str, indent: str = "") -> list[str]:

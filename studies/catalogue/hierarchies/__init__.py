@@ -27,7 +27,7 @@ from ...results.analysis import (
     steps_estimate,
 )
 from ...results.differences import Pair
-from ...results.notation import wrapped
+from ...results.notation import listed
 from ...results.results import Results
 from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly
@@ -101,9 +101,7 @@ def analysis_of(results: Results, cases: Sequence[SizedCase], reference: str) ->
     judgement, lines = judged(pairs, reference, main, title)
     compared = {setting: own for setting, own in judgement.items() if own}
     others = distinct(case.setting for case in cases if case.setting not in bases)
-    if others:
-        text = f"Not compared, because {reference} is missing: {'; '.join(others)}."
-        lines = [*lines, *wrapped(text)]
+    lines += listed(f"Not compared, because {reference} is missing", others)
     notes = ["Rows: setting, hierarchy."] * any(case.group for case in cases)
     notes += left_out_lines(results, "evaluation")
     return Analysis(tuple(table), (*notes, MESSAGES, "", *(lines or [NOTHING])), cases, compared)
