@@ -97,7 +97,8 @@ def sign_change(sizes: Sequence[float], differences: Array) -> Estimate | None:
     Between measured sizes the differences are interpolated on a logarithmic scale. The interval
     consists of the sizes around the sign change at which the interpolated mean does not differ
     significantly from zero. There is a sign change only if the difference is significantly positive
-    at the largest size and not positive at a smaller one.
+    at the largest size and not positive at a smaller one. Sizes at which all seeds are equal do not
+    count: nothing differs there, as between a chain and a star of two agents.
 
     Parameters
     ----------
@@ -106,7 +107,11 @@ def sign_change(sizes: Sequence[float], differences: Array) -> Estimate | None:
     differences
         ``(n_seeds, n_sizes)`` differences of paired seeds.
     """
-    positions = np.log(np.asarray(sizes, dtype=float))
+    differs = differences.any(axis=0)
+    differences = differences[:, differs]
+    positions = np.log(np.asarray(sizes, dtype=float)[differs])
+    if len(positions) < 2:
+        return None
     means = differences.mean(axis=0)
     at_end = mean_interval(differences[:, -1])
     not_positive = np.flatnonzero(means <= 0.0)

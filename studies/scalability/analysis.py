@@ -24,6 +24,13 @@ MAX_NAMED = 4
 BEST_NAMED = 3
 """Number of hierarchies that it describes if there are more: the best at the largest size."""
 
+GROWTH = {
+    "strong": "is the same for all sizes (strong scaling)",
+    "weak": "grows with the team (weak scaling)",
+    None: "grows, but not in proportion to the team",
+}
+"""How the task depends on the team, in words."""
+
 
 @dataclass(frozen=True, repr=False)
 class Scalability:
@@ -41,16 +48,21 @@ class Scalability:
 
     @cached_property
     def speedups(self) -> Mapping[str, Mapping[float, Mapping[str, Estimate]]]:
-        """Speed-up, efficiency and serial fraction by hierarchy and size."""
-        return {name: speedups(own, self.data.scaling) for name, own in self.times.items()}
+        """Speed-up, efficiency and serial fraction by hierarchy and size.
+
+        There are none if the task grows, but not in proportion to the team.
+        """
+        scaling = self.data.scaling
+        return {name: speedups(own, scaling) for name, own in self.times.items() if scaling}
 
     @cached_property
     def universal_laws(self) -> Mapping[str, UniversalLaw]:
         """Universal scalability law by hierarchy, where there are enough sizes."""
+        scaling = self.data.scaling
         return {
-            name: fit_universal_law(own, self.data.scaling)
+            name: fit_universal_law(own, scaling)
             for name, own in self.times.items()
-            if own.shape[1] >= MIN_SIZES
+            if scaling and own.shape[1] >= MIN_SIZES
         }
 
     @cached_property
@@ -124,11 +136,10 @@ class Scalability:
     def _sentences(self) -> Iterator[str]:
         data = self.data
         sizes = data.all_sizes
-        growth = "grows with the team" if data.scaling == "weak" else "is the same for all sizes"
         title = data.performance_title
         yield (
             f"{title[0].upper()}{title[1:]} was measured with {sizes[0]:g} to {sizes[-1]:g} "
-            f"{data.size}; the task {growth} ({data.scaling} scaling)."
+            f"{data.size}; the task {GROWTH[data.scaling]}."
         )
         yield from self._best_sentences()
         yield from self._size_sentences()
@@ -189,6 +200,8 @@ class Scalability:
         known = [own for own in self.crossovers if {*own[:2]} <= {*self.named}]
         for better, worse, size in known:
             yield f"From {format_estimate(size)} {data.size} on, {better} beats {worse}."
+        if known:
+            yield "These intervals are Student's over seeds, not adjusted for several pairs."
         other = "other " if known else ""
         between = " between them" if self.named != data.hierarchies else ""
         largest = f"{data.all_sizes[-1]:g} {data.size}"

@@ -55,8 +55,8 @@ class ScalabilityData:
 
     size: str
     """Name of the size, such as ``robots``."""
-    scaling: Scaling
-    """Whether the task stays the same or grows with the team."""
+    scaling: Scaling | None
+    """Whether the task stays the same or grows in proportion to the team; None: neither."""
     performance: Measure
     performance_title: str
     performances: Cells
@@ -128,7 +128,7 @@ def paired(columns: Sequence[pd.Series]) -> Array:
 
 def collect(
     results: Results,
-    scaling: Scaling,
+    scaling: Scaling | None,
     *,
     measure: str,
     size: str | None = None,
@@ -141,7 +141,7 @@ def collect(
     results
         Results of a study that sweeps the team size, a key with numbers.
     scaling
-        Whether the task stays the same or grows with the team.
+        Whether the task stays the same or grows in proportion to the team; None: neither.
     measure
         Name of the measure of performance.
     size

@@ -27,6 +27,10 @@ ASSUMED = (
     "The scenario does not say whether its task grows with the team: strong scaling is assumed. "
     "Set it with --scaling strong or --scaling weak."
 )
+NOT_PROPORTIONAL = (
+    "Speed-ups and efficiencies are left out: they need a task that is the same for all sizes or "
+    "grows in proportion to the team. Name such sizes by --where, or set --scaling."
+)
 
 
 REMARK = (
@@ -44,7 +48,7 @@ class ScalabilityReport(Scalability, Report):
     @property
     def table(self) -> SummaryTable:
         """Performance, speed-up, efficiency, serial fraction and costs by hierarchy and size."""
-        return tabulate(self.summaries, remark=REMARK)
+        return tabulate(self.summaries, remark=REMARK if self.speedups else "")
 
     @property
     def laws(self) -> SummaryTable:
@@ -114,25 +118,34 @@ def analyze(
     """Return the report of results with the settings of their conditions, see `StudyResults`."""
     if scaling not in (None, *get_args(Scaling)):
         raise SpecError(f"scaling = {scaling!r}: allowed are {', '.join(get_args(Scaling))}")
-    by_scenario = _scaling_of(results, settings, size)
+    growth, remark = (scaling, "") if scaling else _scaling_of(results, settings, size)
     data = collect(
         results,
-        scaling or by_scenario or "strong",
+        growth,
         measure=results.main.name if measure is None else measure,
         size=size,
         criterion=criterion,
     )
-    report = ScalabilityReport(data, budget, () if scaling or by_scenario else (ASSUMED,))
+    report = ScalabilityReport(data, budget, (remark,) if remark else ())
     _ = report.choices  # a wrong budget is refused before anything is printed
     return report
 
 
 def _scaling_of(
     results: Results, settings: Mapping[str, ConditionSettings], size: str | None
-) -> Scaling | None:
-    """Return whether the task grows with the team; None if the scenario does not say."""
+) -> tuple[Scaling | None, str]:
+    """Return whether the task grows in proportion to the team, see `collect`, and a remark."""
     places = SizeAxis.of(results, size).places
-    known = {own.scenario.task_size for label, own in settings.items() if label in places}
-    if not known or None in known:
-        return None
-    return "weak" if len(known) > 1 else "strong"
+    tasks = {
+        n: settings[label].scenario.task_size
+        for label, (_, n) in places.items()
+        if label in settings
+    }
+    known = {n: task for n, task in tasks.items() if task is not None}
+    if not known or len(known) < len(tasks):
+        return "strong", ASSUMED
+    if len({*known.values()}) == 1:
+        return "strong", ""
+    if len({round(task / n, 9) for n, task in known.items()}) == 1:
+        return "weak", ""
+    return None, NOT_PROPORTIONAL

@@ -68,6 +68,14 @@ def test_no_sign_change_is_claimed_without_one(means):
     assert sign_change([2, 4, 8], differences) is None
 
 
+def test_sizes_at_which_all_seeds_are_equal_are_left_out():
+    differences = np.random.default_rng(0).normal([0.0, 0.5, 0.9], 0.05, (12, 3))
+    differences[:, 0] = 0.0
+    assert sign_change([1, 2, 4], differences) is None
+    differences[:, 1] -= 1.0
+    assert float(sign_change([1, 2, 4], differences).value) == pytest.approx(2.7, abs=0.2)
+
+
 def test_the_interval_of_a_sign_change_covers_the_truth_at_its_level():
     rng = np.random.default_rng(1)
     sizes = np.array([1.0, 2.0, 4.0, 8.0, 16.0])

@@ -74,6 +74,19 @@ def test_arms_have_the_same_task_for_all_sizes():
     assert na.load(RESULTS / "arms.json").scalability().data.scaling == "strong"
 
 
+def test_a_task_that_grows_out_of_proportion_has_no_speed_up(tmp_path):
+    steps = {"steps": 2, "evaluation": 1, "episodes": 1, "preset": "random"}
+    spec = steps | {"study": "scaling", "seeds": 2, "sweep": {"scenario.robots": [1, 2, 4]}}
+    study = na.run(spec, tmp_path / "out", jobs=1, progress=False)
+    report = study.scalability()
+    assert report.data.scaling is None  # the box grows from two robots on
+    assert not report.speedups
+    assert not report.universal_laws
+    assert "--where" in " ".join(report.remarks)
+    assert draw(report).axes
+    assert study.where("robots >= 2").scalability().data.scaling == "weak"
+
+
 def test_the_scaling_may_be_named():
     assert na.load(SCALING).scalability(scaling="strong").data.scaling == "strong"
     with pytest.raises(na.SpecError, match="scaling = 'other': allowed are strong, weak"):
