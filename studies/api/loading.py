@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import get_args
@@ -65,6 +66,7 @@ def load(*places: Place, columns: Sequence[str] = (), better: Better | None = No
     expect_each("pairs of a role and a column, ROLE=COLUMN", str, columns=columns)
     paths = [Path(place) for place in places]
     _check_distinct(paths)
+    paths = _without_descriptions(paths)
     roles = parse_roles(columns)
     opened = {path: _open(path) for path in paths}
     if roles and not any(isinstance(own, ScoreTable) for own in opened.values()):
@@ -273,6 +275,20 @@ def _of_scores(
     remarks = tuple(f"{path}: {line}" if path else line for line in notes)
     sources = _sources_beside(path)
     return StudyResults(outline, results, (), remarks, sources, _defaults=(measure, read.by))
+
+
+def _without_descriptions(paths: Sequence[Path]) -> list[Path]:
+    """Return paths without the files that describe exported ones, which a pattern also names."""
+    described: dict[Path, Header] = {}
+    for path in paths:
+        with suppress(SpecError):  # a file of this name may hold other results
+            header = Header.in_folder_of(path) if path.name == HEADER else None
+            described |= {path: header} if header else {}
+    rest = [path for path in paths if path not in described]
+    if not rest:
+        names = ", ".join(described[paths[0]].files) or "none"
+        raise SpecError(f"{paths[0]}: holds no results, it describes exported files: {names}")
+    return rest
 
 
 def _check_distinct(paths: Sequence[Path]) -> None:

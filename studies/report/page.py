@@ -60,6 +60,7 @@ def page(directory: Path) -> str:
         trials = store.planned()
         packed = replays(store, results, trials)
         sources = sources_of(store)
+        files = [hide_places(name) for name in store.sources()]
         settings = store.settings()
         drawn = hierarchy_pictures(store)
         older = older_results(store)
@@ -95,6 +96,7 @@ def page(directory: Path) -> str:
         hierarchies=drawn,
         failed=failed,
         spec=dumps(outline.table),
+        files=files,
         versions=versions(),
         results_version=results_version,
         css=_read_own("page.css"),

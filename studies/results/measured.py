@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.interface.measures import RETURN, SUCCESS, Measure
 from ...core.numerics import pd
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, near
 from ..errors import SpecError
 from .differences import BySeed
 from .notation import MIN_LARGEST
@@ -155,7 +155,8 @@ def _trial_numbers(
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
     column = next((c for c in columns if name in names[c]), None)
     if column is None:
-        known = closest(name, {*others, *columns})
+        spellings = [*others, *columns, *(heading for _, _, heading in names.values())]
+        known = f"{near(name, spellings)} known: {', '.join(sorted({*others, *columns}))}".lstrip()
         if not results.phases and name == RETURN.name:  # the measure by default
             raise SpecError(f"measure: name one, because there are no episodes; {known}")
         raise SpecError(f"measure = {name!r}: {known}")

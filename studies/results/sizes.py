@@ -11,6 +11,15 @@ UNKNOWN = "agent groups"
 """Name of the bodies if their number is not swept."""
 
 
+def with_name(number: float, plural: str) -> str:
+    """Return a number of bodies.
+
+    >>> with_name(1, "robots"), with_name(8.0, "robots")
+    ('1 robot', '8 robots')
+    """
+    return f"{number:g} {plural.removesuffix('s') if number == 1 else plural}"
+
+
 class Sizes(NamedTuple):
     """Numbers of bodies.
 
@@ -47,4 +56,4 @@ class Sizes(NamedTuple):
         """Return a number with its name; nothing if it is the same everywhere and not swept."""
         if not self.keys and len(set(self.counts.values())) == 1:
             return ""
-        return f"{number} {self.word.removesuffix('s') if number == 1 else self.word}"
+        return with_name(number, self.word)

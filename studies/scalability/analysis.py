@@ -12,6 +12,7 @@ from ...core.numerics import pd
 from ..laws.universal import MIN_SIZES, UniversalLaw, fit_universal_law, speedups
 from ..results.analysis import Summary
 from ..results.notation import format_estimate, format_number
+from ..results.sizes import with_name
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 from . import fronts
 from .data import DECISIONS, HEADINGS, Place, ScalabilityData
@@ -125,7 +126,9 @@ class Scalability:
                 for cost, known in self.cost_estimates.items():
                     estimates |= {HEADINGS[cost]: known[place]} if place in known else {}
                 seeds = len(self.data.performances[place])
-                lines.append(Summary(f"{name}, {size:g} {self.data.size}", seeds, estimates))
+                lines.append(
+                    Summary(f"{name}, {with_name(size, self.data.size)}", seeds, estimates)
+                )
         return tuple(lines)
 
     @property
@@ -232,7 +235,7 @@ class Scalability:
 
     def _budget_sentences(self) -> Iterator[str]:
         for choice in self.choices.itertuples():
-            with_size = f"{choice.size:g} {self.data.size}"
+            with_size = with_name(choice.size, self.data.size)
             where = f"Within {self.budget}, with {with_size}"
             if choice.unknown:
                 yield f"With {with_size}, a cost of {_join(choice.unknown)} is not known."
@@ -261,13 +264,13 @@ def place_of_maximum(law: UniversalLaw, largest: float, size: str) -> str:
         )
     if value > largest:
         return (
-            f"the team of maximum throughput has more than {math.floor(low)} {size}, and may be "
-            "larger than those measured"
+            f"the team of maximum throughput has more than {with_name(math.floor(low), size)}, "
+            "and may be larger than those measured"
         )
     if math.isinf(high):
         return (
-            f"the throughput is at its maximum with {math.floor(low)} {size} or more; these seeds "
-            "give no upper bound"
+            f"the throughput is at its maximum with {with_name(math.floor(low), size)} or more; "
+            "these seeds give no upper bound"
         )
     return f"the throughput is at its maximum with {format_estimate(law.best_size)} {size}"
 

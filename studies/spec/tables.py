@@ -288,9 +288,9 @@ def table_of(text: str, source: str) -> TomlTable:
 def first_sentence(text: str) -> str:
     r"""Return the first sentence of the comment at the top of a TOML text; empty without one.
 
-    >>> first_sentence("# Do two robots learn? See Fig. 5.\nstudy = 'scaling'")
-    'Do two robots learn?'
+    >>> first_sentence("# A wheel fails: do two robots cope? See Fig. 5.\nstudy = 'scaling'")
+    'A wheel fails: do two robots cope?'
     """
     lines = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
     comment = " ".join(line[1:].strip() for line in lines if not line.startswith("#:"))
-    return re.split(r"(?<=[?!])\s|[.:](?:\s|$)", comment, maxsplit=1)[0].strip()
+    return re.split(r"(?<=[?!])\s|\.(?:\s|$)", comment, maxsplit=1)[0].rstrip(":").strip()

@@ -123,6 +123,15 @@ def test_exported_trials_give_the_verdict_of_the_study(
     assert main(["table", str(path), "--as", "learning-curve"]) == 0
 
 
+def test_a_pattern_may_name_the_description_too(study: Path, tmp_path: Path) -> None:
+    assert main(["export", str(study), "--out", str(tmp_path), "--format", "marl-eval"]) == 0
+    files = sorted(tmp_path.iterdir())
+    assert [file.name for file in files] == ["marl-eval.json", "study.json"]
+    assert verdict(na.load(*files)) == verdict(na.load(files[0]))
+    with pytest.raises(SpecError, match=r"study\.json: holds no results.* marl-eval\.json"):
+        na.load(files[1])
+
+
 def test_the_order_of_rows_and_columns_does_not_matter(study: Path, tmp_path: Path) -> None:
     assert main(["export", str(study), "--out", str(tmp_path)]) == 0
     path = tmp_path / "episodes.csv"

@@ -175,6 +175,16 @@ def test_every_study_has_a_report_before_it_has_begun(path, kept, tmp_path):
     assert "There is nothing to show yet." in html
 
 
+def test_a_report_names_the_files_that_its_spec_needs(kept, tmp_path):
+    (tmp_path / "mine.py").write_text("def alone(agents, bodies):\n    return []\n")
+    own = tmp_path / "own.toml"
+    own.write_text('seeds = 1\nepisodes = 1\nevaluation = 1\ntopology = "mine.py:alone"\n')
+    html = page(kept(tmp_path / "kept", Spec.load(own), done=0))
+    hint = html.partition("To run the study again")[2].partition("</p>")[0]
+    assert "<code>mine.py</code>" in hint
+    assert "<code>./dev exec nested-agents run study.toml --out DIR</code>" in hint
+
+
 def test_a_study_of_team_sizes_has_a_section_on_scalability(kept, tmp_path):
     spec = Spec.of({**SIZES, "sweep": {"scenario.robots": [2, 4], "topology": ["chain", "star"]}})
     html = page(kept(tmp_path, spec, done=12))

@@ -121,6 +121,8 @@ def test_what_is_compared_goes_by_any_of_its_names() -> None:
         compare_conditions(results, reference="chain")
     times = compare_conditions(results, "decision_median")
     assert times.title == compare_conditions(results, "decision [ms]").title == "decision [ms]"
+    with pytest.raises(SpecError, match=r"did you mean 'decision \[ms\]'"):
+        compare_conditions(results, "decision_ms")
     times = scaling({2: 0.9, 4: 0.8}).frames()
     for name in ("seconds.learning", "learning", "seconds.learning [s]"):
         assert compare_conditions(times, name).title == "seconds.learning [s]"

@@ -110,7 +110,7 @@ def test_numbers_of_whole_trials_leave_the_times_of_evaluation():
     ("best", "expected"),
     [
         ((20.0, 1.0, 30.0), "no best team size"),
-        ((20.0, 1.2, 30.0), "more than 1 robots"),
+        ((20.0, 1.2, 30.0), "more than 1 robot,"),
         ((20.0, 16.0, 30.0), "more than 16 robots"),
         ((8.0, 2.5, np.inf), "2 robots or more"),
         ((8.0, 6.0, 10.0), "at its maximum with 8 [6, 10] robots"),
