@@ -12,7 +12,6 @@ import click
 
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
-from nested_agents.scenarios.adapters.scenario import EnvironmentScenario
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
@@ -25,16 +24,16 @@ from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.tables import dumps
 
 BESIDE = {
-    "*swept keys*": ("", "a column for every swept key, and `name` if there are overrides"),
-    "*measures*": ("", "those of the scenario, in the table below"),
-    "seconds.decision": ("s", "time spent on decisions, predictions included"),
+    "*swept keys*": ("", "a column for every swept key, and `name` if the spec has overrides"),
+    "*measures*": ("", "measures of the scenario, in the tables below"),
+    "seconds.decision": ("s", "time spent on decisions, including predictions"),
     "seconds.physics": ("s", "time spent on physics"),
     "seconds.sensors": ("s", "time spent on sensing"),
     "seconds.learning": ("s", "time spent on learning"),
     "seconds.total": ("s", "time that the trial took"),
-    "*numbers*": ("", "numbers of whole trials that the study keeps, in the table below"),
+    "*numbers*": ("", "numbers of the trial that the study keeps, in the table below"),
 }
-"""What columns mean that are not the same in all studies, or are of times."""
+"""Unit and meaning of columns that depend on the study, and of times."""
 EPISODES = tuple(
     (name, *(EPISODE_COLUMNS | BESIDE)[name])
     for name in (
@@ -88,12 +87,12 @@ def prose(text: str) -> str:
 def keys() -> Iterator[str]:
     """Yield the page on the keys of a spec."""
     yield "# Keys of a spec\n"
-    yield "This page is made from the settings models that check every spec, and from the text"
-    yield "beside their fields. `nested-agents keys scenario.box` prints any part of it in a"
-    yield "terminal. A key is written in the table of its heading. *Required* means that there is"
-    yield "no default; *none* is the absence of a value, and cannot be written in TOML. A spec"
-    yield "begins from the [preset](#presets) `default` unless it names another, so that where this"
-    yield "has a value of its own the default does not apply.\n"
+    yield "This page is generated from the settings models that check every spec. In a terminal,"
+    yield "`nested-agents keys scenario.box` prints a part of it. A heading names the table of a"
+    yield "spec that contains the keys below it. *Required* means that there is no default. *None*"
+    yield "means that no value is set, which TOML cannot express; if it is the default, `unset`"
+    yield "restores it. A spec starts from the [preset](#presets) `default` if it names no other."
+    yield "If the preset sets a key, its value replaces the default.\n"
     for one in tables():
         yield f"## {code(one.heading) if one.name else 'The top of a spec'}\n"
         yield f"{prose(one.summary)}\n"
@@ -114,8 +113,8 @@ def keys() -> Iterator[str]:
                 ),
             )
     yield "## Presets\n"
-    yield "A preset is laid under the tables of a spec. `nested-agents presets NAME` prints it in"
-    yield "full.\n"
+    yield "A preset is a named set of values from which a spec starts. The tables of the spec"
+    yield "override these values. `nested-agents presets NAME` prints a preset in full.\n"
     for name, preset in PRESETS.items():
         summary = preset["summary"]
         yield f"### `{name}`\n\n{summary[0].upper()}{summary[1:]}.\n"
@@ -126,7 +125,7 @@ def keys() -> Iterator[str]:
     yield f"Boxes: {', '.join(map(code, BOXES))}.\n"
     yield f"Robots: {', '.join(map(code, ROBOTS))}.\n"
     for kind, registry in VARIABLES.items():
-        yield f"State variables of `{kind}`, beside the speed of the agent's own actuator:\n"
+        yield f"State variables of `{kind}`, besides the speed of the agent's own actuator:\n"
         named = ((name, registry.find(name)) for name in registry.built_in)
         yield from table(
             ("state variable", "unit", "range", "meaning"),
@@ -145,8 +144,8 @@ def keys() -> Iterator[str]:
 def columns() -> Iterator[str]:
     """Yield the page on the columns of results."""
     yield "# Columns of results\n"
-    yield "`export` writes the tables `episodes` and `trials`; the view `results` of the database"
-    yield "and `nested-agents results --format csv` hold the first. A unit of 1 is a pure number.\n"
+    yield "`export` writes the tables `episodes` and `trials`. `nested-agents results --format csv`"
+    yield "prints the rows of episodes, too. The unit 1 is that of a pure number.\n"
     headings = ("column", "unit", "meaning")
     for title, rows in (
         ("Rows of episodes", EPISODES), ("Rows of trials", TRIALS),
@@ -156,14 +155,17 @@ def columns() -> Iterator[str]:
         yield from table(headings, ((code(n) if "*" not in n else n, u, m) for n, u, m in rows))
     yield "## Measures of the scenarios\n"
     yield "A scenario declares its own [measures](../extending.md#a-scenario). These are"
-    yield "the measures of the built-in scenarios.\n"
-    # Built only of an environment, or a task.
-    adapted = {"gymnasium": EnvironmentScenario, "pettingzoo": EnvironmentScenario}
+    yield "the measures of the built-in scenarios. *Value* says how the value of an episode follows"
+    yield "from those of its steps: the last one, their mean, sum or maximum. Environments of"
+    yield "Gymnasium and PettingZoo have two measures: `success`, which is 0 unless a spec defines"
+    yield "`scenario.success`, and `total_reward`, the sum of the rewards, mean over agents.\n"
     for kind in SCENARIOS.built_in:
+        if kind in ("gymnasium", "pettingzoo"):
+            continue  # built only of an environment
         yield f"### `{kind}`\n"
-        declared = adapted.get(kind) or SCENARIOS.parsed(kind).build()
+        declared = SCENARIOS.parsed(kind).build()
         yield from table(
-            ("column", "heading", "unit", "of the steps of an episode", "better", "bounds"),
+            ("column", "heading", "unit", "value", "better", "bounds"),
             (
                 (code(m.name), m.title, m.unit, "yes (1) or no (0)" if m.is_rate else m.gathering,
                  m.better or "", bounds(m))
@@ -182,9 +184,9 @@ def bounds(measure: Measure) -> str:
 def commands() -> Iterator[str]:
     """Yield the page on the command line."""
     yield "# Commands\n"
-    yield "In a checkout, `./dev exec` goes before every command. The exit status is 0 if all went"
-    yield "well, 1 if a trial failed, 2 if there is something for you to mend, which one line on"
-    yield "standard error names, and 130 after Ctrl-C.\n"
+    yield "In a checkout, write `./dev exec` before every command. The exit status is 0 if the"
+    yield "command succeeds, 1 if a trial failed, and 130 after Ctrl-C. It is 2 if the input has a"
+    yield "mistake, which one line on standard error names.\n"
     yield from table(
         ("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, (_, t) in COMMANDS.items())
     )

@@ -195,7 +195,7 @@ def edges() -> list[EdgeWorth]:
 
 def edge_lines() -> Iterator[str]:
     """Yield a table of what edges are worth, a line for every task."""
-    yield "| rows | seeds | decisions | with edges less without | p | margin | edge |"
+    yield "| rows | seeds | decisions | with edges minus without | p | margin | edge |"
     yield "|---|---|---|---|---|---|---|"
     for worth in edges():
         cells = (

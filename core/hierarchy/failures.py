@@ -173,7 +173,7 @@ class NoisyMessages(MessageFailure):
 
 
 class AbsentAgents(MessageFailure):
-    """The agents perform the neutral action and send no messages; the others do not know."""
+    """The agents perform the neutral action and send no messages; the others are not informed."""
 
     kind: Literal["absent"] = "absent"
 

@@ -47,7 +47,7 @@ class ValueDecompositionSettings(OneStepSettings):
     kind: Literal["vdn"] = "vdn"
     factory: ClassVar[str] = f"{__name__}:ValueDecomposition"
     step_size: Positive = 0.1
-    """alpha, divided by the squared length of all agents' feature vectors together."""
+    """Step size, divided by the squared length of all agents' feature vectors together."""
 
 
 class ValueDecomposition(SparseCooperative):

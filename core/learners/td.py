@@ -134,7 +134,7 @@ class TDLambdaSettings(LearnerSettings):
     normalized: bool = False
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
-    """Number of updates over which the agents average the learned weights to decide; 1: none."""
+    """Number of updates over which agents average the weights for decisions; 1: no averaging."""
     initial_weight: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     """Consequent weight of every rule before learning. With ``order = "full"`` it is the value of
     every state; above attainable values it favors states that were not visited."""
@@ -218,7 +218,7 @@ class OneStepSettings(LearnerSettings):
     """Base class of the settings of `OneStep` learners."""
 
     step_size: Positive = 0.1
-    """alpha, divided by the squared length of the feature vector."""
+    """Step size alpha, divided by the squared length of the feature vector."""
 
 
 class OneStep(Online):
@@ -331,7 +331,7 @@ class QLearningSettings(OneStepSettings):
     kind: Literal["q-learning"] = "q-learning"
     factory: ClassVar[str] = f"{__name__}:QLearning"
     step_size: Positive = 0.3
-    """alpha, divided by the squared length of the feature vector."""
+    """Step size alpha, divided by the squared length of the feature vector."""
 
 
 class QLearning(OneStep):

@@ -39,7 +39,7 @@ class CalibrationSettings(Settings):
     """Mean squared innovation of a body, in units of its expected square, above which the body has
     less weight."""
     drift: NonNegative = 0.003
-    """Standard deviation of the drift per decision that pushes; variances add."""
+    """Standard deviation of the drift of a logarithm in one decision with contact."""
 
 
 class Calibration(Adaptive[EmbodiedPrediction]):

@@ -39,11 +39,11 @@ class NetworkSettings(TeamSettings):
     environments: Annotated[int, Field(ge=1, le=4096)] = 1
     """Number of environments that are stepped at once; 2 or more need a budget in decisions."""
     learning_rate_decisions: Count | None = None
-    """Decisions, of all environments, over which `learning_rate` falls linearly to 0. Without a
-    number it stays constant."""
+    """Decisions, summed over all environments, over which `learning_rate` falls linearly to 0.
+    Without a number it stays constant."""
     entropy_decisions: Count | None = None
-    """Decisions, of all environments, over which `entropy` falls linearly to 0. Without a number
-    it stays constant."""
+    """Decisions, summed over all environments, over which `entropy` falls linearly to 0. Without a
+    number it stays constant."""
 
     @property
     def n_environments(self) -> int:

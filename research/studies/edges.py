@@ -114,7 +114,7 @@ def draw(analysis: Analysis) -> Figures:
 
     names = {case.name for case in analysis.cases if EVALUATED in case.values}
     figures = _draw_parted(analysis) if {*sum(PARTED, ())} <= names else {}
-    unit = f"difference from {TRAINED}" if not names else f"success less that {TRAINED}"
+    unit = f"difference from {TRAINED}" if not names else f"success minus that {TRAINED}"
     return figures | draw_forest("differences", analysis.differences, unit)
 
 
@@ -133,14 +133,15 @@ def _draw_parted(analysis: Analysis) -> Figures:
         fields = np.array([[by_name[setting, name] for name in row] for row in PARTED], dtype=float)
         axes.imshow(fields[..., 0], "Blues", vmin=0, vmax=1)
         for row, column in np.ndindex(2, 2):
-            value, low, high = map(format_number, fields[row, column])
+            name = PARTED[row][column]
+            value, _, interval = format_estimate(by_name[setting, name]).partition(" ")
             color = "white" if fields[row, column, 0] > 0.5 else "black"
             write = partial(axes.text, column, ha="center", color=color)
             write(row, value, va="bottom", fontsize=15)
-            write(row + 0.08, f"[{low}, {high}]", va="top", fontsize=7)
+            write(row + 0.08, interval, va="top", fontsize=7)
         axes.set_title(setting, loc="left")
-        axes.set_xticks((0, 1), ("nobody\nconsidered", "those below\nconsidered"))
-        axes.set_yticks((0, 1), ("not told", "told"))
+        axes.set_xticks((0, 1), ("without\nlookahead", "with\nlookahead"))
+        axes.set_yticks((0, 1), ("without\nmessages", "with\nmessages"))
         axes.tick_params(length=0, labelsize=7.5)
         axes.spines[:].set_visible(False)
     figure.suptitle("evaluation success of the same weights, 95% intervals", fontsize=9)

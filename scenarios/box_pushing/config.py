@@ -27,9 +27,9 @@ class LeaderSettings(Settings):
     """Leader above all robots, which decides between a straight push and a second side."""
 
     policy: Literal["none", "rule", "learned"] = "none"
-    """Policy of the leader: there is ``none``, it pushes from a second side if the goal is more
-    than 20 degrees off (``rule``), or it is ``learned`` while all other agents keep their
-    weights."""
+    """Policy of the leader. With ``none`` there is no leader. With ``rule`` the robots push from a
+    second side if the goal is more than 20 degrees off. With ``learned`` the leader learns this
+    choice while all other agents keep their weights."""
     learner: FittedQSettings = FittedQSettings(
         discount=0.995,
         regression_iterations=60,
@@ -68,8 +68,9 @@ class BoxTaskSettings(ScenarioSettings):
     """Distribution of start poses: how far off the course to the goal robots and box begin. With
     ``fixed`` every episode starts in the same poses, on the course."""
     scaling: Literal["fixed", "similar"] = "fixed"
-    """Whether the box's distance to the goal, `tolerance`, `termination_radius` and the reward's r1
-    stay as they are whatever the number of robots, or are in units of the box and grow with it."""
+    """Lengths of the task for larger teams. With ``fixed`` the distance of the box to the goal,
+    `tolerance`, `termination_radius` and r1 of the reward are the same for all teams. With
+    ``similar`` they grow with the box."""
     failures: tuple[Failure, ...] = ()
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
     action_repeat: Periods = 8
@@ -79,10 +80,10 @@ class BoxTaskSettings(ScenarioSettings):
     tolerance: Positive = 0.05
     """Distance of the box from the goal that counts as reached [m]."""
     termination_radius: Positive = 1.5
-    """Distance of the box from the goal [m] beyond which an episode is broken off."""
+    """Distance of the box from the goal [m] beyond which an episode ends."""
     orientation_tolerance: Positive | None = None
-    """Orientation error that still counts as reached [rad]; none: any. With a tolerance, results
-    contain the orientation error at the end of each episode."""
+    """Orientation error that still counts as reached [rad]. Without a value any orientation does.
+    With a value, results contain the orientation error at the end of each episode."""
 
     @property
     def task_size(self) -> float:

@@ -137,7 +137,7 @@ def lever(view: ChainView, joint: Joints) -> FloatArray:
 
 @state_variable("m", -1.0, 1.0, centers=(-0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5), mirrored="same")
 def excess(view: ChainView, joint: Joints) -> FloatArray:
-    """Distance of the goal from the joint minus that of the tip: positive means to stretch."""
+    """Distance of the goal from the joint minus that of the tip; positive if it must stretch."""
     return _length(view.goal - view.places[:-1][joint]) - lever.function(view, joint)
 
 

@@ -176,7 +176,7 @@ def others_gap(situation: Situation, robot: Robot) -> float:
 
 @_angle(_SIDES, common=True)
 def push_bearing(situation: Situation, robot: Robot) -> float:
-    """Direction in which a push from the middle of the robots moves the box, off the course."""
+    """Angle from the course to the direction of a push from the middle of the robots."""
     return _off_course(situation, situation.middle)
 
 
@@ -190,7 +190,7 @@ def push_bearing(situation: Situation, robot: Robot) -> float:
     mirrored="opposite",
 )
 def cross_track_error(situation: Situation, robot: Robot) -> float:
-    """Distance by which that push misses the goal; beyond a right angle, the whole distance."""
+    """Distance by which that push misses the goal; beyond a right angle, the goal's distance."""
     return _miss(situation, _off_course(situation, situation.middle))
 
 
@@ -260,25 +260,25 @@ def others_away(situation: Situation, robot: Robot) -> float:
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), contact=True, common=True)
 def contact_push_bearing(situation: Situation, robot: Robot) -> float:
-    """Direction in which the robots in contact push the box, off the course."""
+    """Angle from the course to the direction in which the robots in contact push the box."""
     return _off_course(situation, situation.contact)
 
 
 @_wide_error
 def contact_cross_track_error(situation: Situation, robot: Robot) -> float:
-    """Distance by which that push misses the goal; beyond a right angle, the whole distance."""
+    """Distance by which that push misses the goal; beyond a right angle, the goal's distance."""
     return _miss(situation, _off_course(situation, situation.contact))
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), contact=True, common=True)
 def path_bearing(situation: Situation, robot: Robot) -> float:
-    """Direction of the path that the box will take, off the course."""
+    """Angle from the course to the path that the box will take."""
     return _path(situation)
 
 
 @_wide_error
 def path_cross_track_error(situation: Situation, robot: Robot) -> float:
-    """Distance by which that path misses the goal; beyond a right angle, the whole distance."""
+    """Distance by which that path misses the goal; beyond a right angle, the goal's distance."""
     return _miss(situation, _path(situation))
 
 

@@ -43,8 +43,8 @@ class RewardSettings(Settings):
     c4: NonNegative = 0.0003
     """Penalty per radian of the box's orientation error (Eq. 16)."""
     least_approach: NonNegative = 0.001
-    """Minimum decrease of the box's distance in a decision period for a negative Delta D [m]. With
-    0, motion by rounding errors would be rewarded."""
+    """Minimum decrease of the box's distance to the goal in a decision period that counts as
+    approach (Condition 1) [m]. With 0, motion by rounding errors would be rewarded."""
     receding: float = 0.000001
     """Reward under Condition 2."""
     some_out_of_range: float = -0.0015
@@ -52,10 +52,11 @@ class RewardSettings(Settings):
     all_out_of_range: float = -0.002
     """Reward under Condition 5."""
     pays_at_goal: bool = True
-    """Whether reaching the goal pays c1, even if a robot has lost touch of the box; otherwise the
-    conditions hold there as anywhere."""
+    """Whether reaching the goal pays c1, even if a robot has lost contact with the box. Otherwise
+    Conditions 1 to 5 also determine the reward at the goal."""
     attraction_without_contact: bool = False
-    """Whether R1 counts under Condition 3 as printed; without it robots do not hover."""
+    """Whether R1 counts under Condition 3, as printed in the paper. Without R1, robots gain nothing
+    by staying near the box without contact."""
 
 
 class WheelFailure(FailureSettings):
@@ -127,7 +128,7 @@ class BoxSettings(Settings):
     contact_friction: Coefficient = 0.3
     """Coefficient of friction with robots."""
     grows: bool | Literal["width"] = False
-    """Whether it grows with the number of robots, as the boxes known by name do; or along its
+    """Whether the box grows with the number of robots, as the built-in boxes do, or along its
     ``width`` only, the side behind which robots start."""
 
 
@@ -143,7 +144,7 @@ class WheelSettings(Settings):
 
 
 class RobotSettings(Settings):
-    """A robot; what is not given is the e-Puck's."""
+    """A robot. Defaults are those of the e-Puck."""
 
     name: Label | None = None
     """Name in labels; nothing else depends on it."""
@@ -154,7 +155,7 @@ class RobotSettings(Settings):
     mass: Quantity = 0.15
     """Mass of the robot [kg], spread evenly over the disc and resting evenly on the wheels."""
     max_speed: Quantity = 0.13
-    """Greatest wheel speed [m/s]; state spaces lay the memberships of wheel speeds over it."""
+    """Maximum wheel speed [m/s], over which the membership functions of wheel speeds spread."""
     stiffness: Quantity = 6.5
     """Stiffness of one wheel's servo [N per m/s]."""
     lateral_stiffness: Quantity = 20.0
@@ -190,7 +191,7 @@ class InfraredSettings(Settings):
     """
 
     reach: Positive = 0.06
-    """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
+    """Distance beyond which the sensors read 0 [m]. Those of the e-Puck reach about 6 cm."""
     decay: Positive = 0.015
     """Distance over which readings, exp(-distance / decay) within reach, fall to 1/e [m]."""
     noise: Annotated[float, Field(ge=0, le=1)] = 0.0

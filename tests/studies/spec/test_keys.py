@@ -123,8 +123,8 @@ def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
     assert capsys.readouterr().out == (
         '[scenario.infrared], of "box-pushing"\n'
         "reach = 0.06: number, > 0, [m]\n"
-        "    Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6\n"
-        "    cm.\n"
+        "    Distance beyond which the sensors read 0 [m]. Those of the e-Puck reach\n"
+        "    about 6 cm.\n"
     )
     assert main(["keys", "lerner"]) == 2
     assert "lerner: unknown key; did you mean 'learner'?" in capsys.readouterr().err
