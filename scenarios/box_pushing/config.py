@@ -68,9 +68,9 @@ class BoxTaskSettings(ScenarioSettings):
     """Distribution of start poses: how far off the course to the goal robots and box begin. With
     ``fixed`` every episode starts in the same poses, on the course."""
     scaling: Literal["fixed", "similar"] = "fixed"
-    """Lengths of the task for larger teams. With ``fixed`` the distance of the box to the goal,
-    `tolerance`, `termination_radius` and r1 of the reward are the same for all teams. With
-    ``similar`` they grow with the box."""
+    """How lengths of the task depend on the number of robots. With ``fixed`` the distance of the
+    box to the goal, `tolerance`, `termination_radius` and r1 of the reward are the same for all
+    teams. With ``similar`` the lengths grow with the box, and r1 falls in proportion."""
     failures: tuple[Failure, ...] = ()
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
     action_repeat: Periods = 8

@@ -18,7 +18,7 @@ from .schema import REGISTRIES, KeySchema, Schema
 from .spec import Spec
 from .tables import flat
 
-UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
+UNIT = re.compile(r"\[(m|m/s|m2/s2|1/m|kg|rad|rad/s|s|N per m/s|m/s per m/s)\]")
 """Unit in the docstring of a field."""
 TYPES = {
     "boolean": "true or false",
@@ -228,7 +228,7 @@ def _kind(schema: Schema, kinds: Sequence[str]) -> Key:
     """Return the key ``kind`` of a table."""
     own = "; or your own, file.py:NAME" if schema.get("title") in REGISTRIES else ""
     default = json.dumps((schema.get("default") or {}).get("kind", kinds[0]))
-    meaning = "Kind of the table; the other keys depend on it."
+    meaning = "Variant of this table. The other keys depend on it."
     return Key("kind", "text", default, ", ".join(kinds) + own, "", meaning, "")
 
 
@@ -259,7 +259,7 @@ def _key(name: str, schema: Schema, preset: object, *, is_required: bool) -> Key
     if schema.get("title") in REGISTRIES:
         kinds = [one["properties"]["kind"].get("const") for one in schema["anyOf"][:-2]]
         type_ = "table"
-        allowed = f"kind: {', '.join(kinds)}"
+        allowed = f"kind: {', '.join(kinds)}" if kinds else ""
     else:
         type_ = _type(schema)
         allowed = ", ".join(dict.fromkeys(_allowed(schema)))
