@@ -35,6 +35,11 @@ LOWER_BOUND = (
 """Remark on the means of `TIME` and `DECISIONS`."""
 
 
+def is_over_episodes(measure: Measure) -> bool:
+    """Return whether a measure is a share of a seed's episodes, not one outcome of a seed."""
+    return measure.is_rate and measure.name not in RECOVERY
+
+
 def recovery(shortfall: ArrayLike, allowed: ArrayLike, last_onset: int = 0) -> tuple[Array, Array]:
     """Return per seed whether it recovered from faults, and after how many episodes.
 

@@ -189,6 +189,8 @@ def test_a_study_of_team_sizes_has_a_section_on_scalability(kept, tmp_path):
     spec = Spec.of({**SIZES, "sweep": {"scenario.robots": [2, 4], "topology": ["chain", "star"]}})
     html = page(kept(tmp_path, spec, done=12))
     assert "scalability" in sections(html)
+    for robots in (2, 4):  # hierarchies are compared within a size, not all with the first
+        assert f"robots={robots}: evaluation success, minus that of chain" in html
     section = html[html.index('<section id="scalability">') :].partition("</section>")[0]
     assert "Evaluation success was measured with 2 to 4 robots" in section
     assert section.count("<svg viewBox") >= 4, "four panels"

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
+from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.results import permutation_tests
 from nested_agents.studies.results.analysis import verdict_lines
 from nested_agents.studies.results.differences import Difference, adjust
@@ -24,6 +25,7 @@ from nested_agents.studies.results.power_text import (
     power_lines,
     power_text,
 )
+from nested_agents.studies.results.recovery import RECOVERED, is_over_episodes
 from nested_agents.studies.results.statistics import bootstrap
 
 
@@ -199,6 +201,11 @@ def test_differences_that_are_equal_except_for_rounding_have_no_power() -> None:
     base = np.linspace(-3.0, 4.0, 8)
     lines = power_lines([(base + 0.5) - base], "score", of_rates=False)
     assert " ".join(lines).startswith("Power: unknown in score, because all seeds have the same")
+
+
+def test_an_outcome_of_a_seed_has_not_the_usual_deviation_of_shares_of_episodes() -> None:
+    assert is_over_episodes(SUCCESS)
+    assert not is_over_episodes(RECOVERED)  # one 0 or 1 for each seed
 
 
 @pytest.mark.parametrize(("counts", "comparisons"), [((8, 8), 1), ((20, 12), 1), ((15, 15), 3)])
