@@ -17,6 +17,7 @@ import numpy as np
 from ...core.interface.measures import Measure, main_measure
 from ...core.numerics import working_seconds
 from ..catalogue.experience import stops
+from ..catalogue.study import load_study
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION
@@ -53,7 +54,7 @@ class Plan:
     seconds: float | None
     """Time of the whole study, extrapolated from pilot episodes [s]; None without a pilot."""
     comparisons: int
-    """Number of conditions that are compared with the first."""
+    """Number of comparisons of the study, over which p is adjusted."""
     measure: Measure
     """Measure by which conditions are compared: success, or the return where there is none."""
     deviation: float | None
@@ -149,6 +150,8 @@ def plan(
     processes = max(1, min(jobs or cores(), len(trials)))
     n_conditions = len(spec.conditions())
     seconds = None
+    with spec.sources.active():
+        comparisons = load_study(spec.study).comparisons(spec)
     if timed:
         with spec.sources.active():
             costs = [pilot(trial) for trial in trials[:n_conditions]]
@@ -159,7 +162,7 @@ def plan(
         trials=len(trials),
         processes=processes,
         seconds=seconds,
-        comparisons=n_conditions - 1,
+        comparisons=comparisons,
         measure=measure,
         deviation=deviation,
         smallest=smallest,

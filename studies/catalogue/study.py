@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 PARTS = ("measure", "analyse", "draw")
 """Attributes that every study needs."""
-OPTIONS = ("check", "NUMBERS", "PUBLISHED", "TIMED")
+OPTIONS = ("check", "comparisons", "NUMBERS", "PUBLISHED", "TIMED")
 """Optional attributes; `Study` has their defaults."""
 
 
@@ -55,6 +55,10 @@ class Study:
 
     def check(self, spec: Spec) -> None:
         """Raise `SpecError` if the spec does not fit the study."""
+
+    def comparisons(self, spec: Spec) -> int:
+        """Return the number of comparisons over which p is adjusted; by default with the first."""
+        return len(spec.conditions()) - 1
 
     def measure(self, trial: Trial) -> TrialResult:
         """Run one trial; imported by name in worker processes."""

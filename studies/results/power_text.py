@@ -103,7 +103,7 @@ def planned_text(
         if deviation
         else "how much those of single seeds deviate is not known before (--deviation)"
     )
-    text = f"Differences of {what}, every condition with the first as in compare, p adjusted; "
+    text = f"Differences of {what}, as the study compares conditions, p adjusted; "
     text += f"{supposed}."
     most = 1.0 if of_rates else math.inf
     known = power_text(seeds, comparisons, deviation or 1.0, smallest, unit=unit, most=most)

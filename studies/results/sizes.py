@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from ..spec.tables import SpecTable
 from .results import Results
 
 UNKNOWN = "agent groups"
@@ -41,7 +42,12 @@ class Sizes(NamedTuple):
     def of(cls, results: Results, conditions: Iterable[str]) -> Sizes:
         """Return the sizes of conditions from the counts of their trials."""
         counts = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-        swept = {c: results.columns.get(c, {}) for c in counts}
+        return cls.counted(counts, results.columns)
+
+    @classmethod
+    def counted(cls, counts: Mapping[str, int], columns: Mapping[str, SpecTable]) -> Sizes:
+        """Return the sizes of conditions from their counts and swept keys."""
+        swept = {c: columns.get(c, {}) for c in counts}
         keys = dict.fromkeys(key for row in swept.values() for key in row)
         own = (k for k in keys if all(str(swept[c].get(k)) == str(n) for c, n in counts.items()))
         return cls(counts, tuple(own))

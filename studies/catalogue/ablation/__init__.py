@@ -20,6 +20,7 @@ from ...results.analysis import (
 from ...results.differences import Pair
 from ...results.results import Results
 from ...results.statistics import exactly
+from ...spec.spec import Spec
 from ..study import measure as measure
 
 PUBLISHED = ("success",)
@@ -29,6 +30,11 @@ PUBLISHED = ("success",)
 def analyse(results: Results) -> Analysis:
     """Estimate and compare with 95% intervals, with seeds as the unit of sampling."""
     return compared_with_first(results, results.of_phase("training"))
+
+
+def comparisons(spec: Spec) -> int:
+    """Return the number of comparisons: with the first condition, in training and evaluation."""
+    return (len(spec.conditions()) - 1) * (1 + (spec.evaluation > 0))
 
 
 def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:

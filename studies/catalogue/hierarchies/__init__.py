@@ -32,7 +32,8 @@ from ...results.results import Results
 from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, exactly
 from ...spec.spec import Spec
-from ...spec.tables import label_but
+from ...spec.tables import SpecTable, label_but
+from ...trials.trial import trials_of
 from ..scaling import NUMBERS, measure
 from ..sized import SizedCase, draw_by_size
 from ..study import check_evaluated, distinct
@@ -59,6 +60,40 @@ def check(spec: Spec) -> None:
         )
 
 
+def comparisons(spec: Spec) -> int:
+    """Return the number of comparisons with the reference in all settings."""
+    columns = {condition.label: condition.columns for condition in spec.conditions()}
+    trials = trials_of(spec)[: len(columns)]
+    counts = {trial.condition: len(trial.world().groups) for trial in trials}
+    sizes = Sizes.counted(counts, columns)
+    cases = [_case(condition, own, sizes, {}) for condition, own in columns.items()]
+    return len(_compared(*_in_order(cases, REFERENCE)))
+
+
+def _case(
+    condition: str, columns: SpecTable, sizes: Sizes, values: dict[str, Estimate]
+) -> SizedCase:
+    """Return the case of a condition."""
+    hierarchy = label_but(columns, (VALUE_OF, *sizes.keys))
+    value_of = str(columns.get(VALUE_OF, ""))
+    return SizedCase(condition, hierarchy, value_of, sizes.counts[condition], sizes, values)
+
+
+def _in_order(cases: Sequence[SizedCase], reference: str) -> tuple[list[SizedCase], str]:
+    """Return sorted cases, and the reference: the first hierarchy if the given one is missing."""
+    groups = distinct(case.group for case in cases)
+    cases = sorted(cases, key=lambda case: (case.robots, groups.index(case.group)))
+    names = [case.name for case in cases]
+    return cases, reference if reference in names else names[0]
+
+
+def _compared(cases: Sequence[SizedCase], reference: str) -> list[tuple[SizedCase, SizedCase]]:
+    """Return the cases that are compared, each with the reference in its setting."""
+    bases = {case.setting: case for case in cases if case.name == reference}
+    others = (case for case in cases if case.name != reference)
+    return [(case, bases[case.setting]) for case in others if case.setting in bases]
+
+
 def analyse(results: Results) -> Analysis:
     """Estimate and compare evaluation results, with seeds as the unit of sampling.
 
@@ -68,39 +103,33 @@ def analyse(results: Results) -> Analysis:
     conditions = results.of_phase("evaluation")
     sizes = Sizes.of(results, conditions)
     cases = []
-    apart = (VALUE_OF, *sizes.keys)
-    for condition, robots in sizes.counts.items():
+    for condition in conditions:
         columns = results.columns.get(condition, {"name": condition})
-        hierarchy = label_but(columns, apart)
-        value_of = str(columns.get(VALUE_OF, ""))
         numbers = results.numbers(condition)
         values = estimates(
             results, condition, "evaluation", numbers["decision_median"], numbers["messages"]
         )
-        cases.append(SizedCase(condition, hierarchy, value_of, robots, sizes, values))
+        cases.append(_case(condition, columns, sizes, values))
     return analysis_of(results, cases, REFERENCE)
 
 
 def analysis_of(results: Results, cases: Sequence[SizedCase], reference: str) -> Analysis:
     """Compare cases with the reference hierarchy, or with the first if it is missing."""
-    groups = distinct(case.group for case in cases)
-    cases = sorted(cases, key=lambda case: (case.robots, groups.index(case.group)))
-    table = [Summary(c.label, len(results.seeds(c.condition)), c.values) for c in cases]
     if not cases:
         return Analysis(())
-    hierarchies = [case.name for case in cases]
-    reference = reference if reference in hierarchies else hierarchies[0]
+    cases, reference = _in_order(cases, reference)
+    table = [Summary(c.label, len(results.seeds(c.condition)), c.values) for c in cases]
     main = results.main
     title = f"evaluation {main.heading}"
-    means = [results.means(case.condition, case.phase, main.name) for case in cases]
-    bases = {c.setting: m for c, m in zip(cases, means, strict=True) if c.name == reference}
-    pairs: dict[str, list[Pair]] = {setting: [] for setting in bases}
-    for case, own in zip(cases, means, strict=True):
-        if case.setting in bases and case.name != reference:
-            pairs[case.setting].append((case.name, title, own, bases[case.setting]))
+    means = {at: results.means(*at, main.name) for at in ((c.condition, c.phase) for c in cases)}
+    settings = {case.setting for case in cases if case.name == reference}
+    pairs: dict[str, list[Pair]] = {}
+    for case, base in _compared(cases, reference):
+        own, other = (means[c.condition, c.phase] for c in (case, base))
+        pairs.setdefault(case.setting, []).append((case.name, title, own, other))
     judgement, lines = judged(pairs, reference, main, title)
     compared = {setting: own for setting, own in judgement.items() if own}
-    others = distinct(case.setting for case in cases if case.setting not in bases)
+    others = distinct(case.setting for case in cases if case.setting not in settings)
     lines += listed(f"Not compared, because {reference} is missing", others)
     notes = ["Rows: setting, hierarchy."] * any(case.group for case in cases)
     notes += left_out_lines(results, "evaluation")
@@ -140,4 +169,4 @@ def draw(analysis: Analysis) -> Figures:
     return {"hierarchies": draw_by_size(analysis.cases, titles)}
 
 
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "check", "comparisons", "draw", "measure"]

@@ -42,7 +42,7 @@ from ...results.recovery import (
 from ...results.results import KEPT, Results
 from ...results.statistics import Array, bootstrap, exactly, rate
 from ...spec.spec import Spec
-from ...spec.tables import label_but
+from ...spec.tables import SpecTable, label_but
 from ...trials.arrangement import arrange
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
@@ -116,6 +116,20 @@ def check(spec: Spec) -> None:
                     f"to {spec.episodes - BLOCK} of {spec.episodes} episodes "
                     f"(condition {condition.label!r})"
                 )
+
+
+def comparisons(spec: Spec) -> int:
+    """Return the number of comparisons: with nothing adapting, or with the first condition."""
+    cases = [_fault_of(c.label, c.columns) for c in spec.conditions()]
+    faults = {fault for fault, enabled in cases if enabled == "false"}
+    adapting = [1 if enabled == "false" else 2 for fault, enabled in cases if fault in faults]
+    return sum(adapting) or len(cases) - 1
+
+
+def _fault_of(condition: str, columns: SpecTable) -> tuple[str, str]:
+    """Return the label of a condition without `SWEPT`, and the value of `SWEPT` if it is swept."""
+    enabled = str(columns.get(SWEPT, ""))
+    return (label_but(columns, [SWEPT]) or "the failure") if enabled else condition, enabled
 
 
 def _keeping_weights(session: Session) -> Team:
@@ -210,9 +224,7 @@ def courses_of(results: Results) -> list[Course]:
     """Return the courses of all conditions, sorted by fault."""
     courses = []
     for condition in results.of_phase(KEPT):
-        columns = results.columns.get(condition, {})
-        enabled = str(columns.get(SWEPT, ""))
-        fault = (label_but(columns, [SWEPT]) or "the failure") if enabled else condition
+        fault, enabled = _fault_of(condition, results.columns.get(condition, {}))
         for phase in (KEPT, "training"):
             course = failure_course(results, condition, phase)
             adapts = ADAPTS.get((enabled, phase), phase)

@@ -1,10 +1,12 @@
 import re
 
 import pytest
+from made_up_results import Arrays, ablation, hierarchies, wheel_failure
 
 import nested_agents as na
 from nested_agents.core.agents.team import Team
 from nested_agents.studies.api import planning
+from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.progress import duration
 from nested_agents.studies.trials.trial import trials_of
@@ -25,6 +27,40 @@ def test_a_plan_shows_trials_time_and_power() -> None:
     assert f"time     about {duration(plan.seconds)} with 2 processes (" in text
     assert "at most" not in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+SEIZED = {"kind": "seized", "wheels": "robot1.left", "episode": 5}
+SWEPT = {"learner.self_model.enabled": [False, True]}
+CHANCES = {(t, "own", n): 0.5 for t in ("chain", "star", "tree") for n in (2, 4)}
+
+
+@pytest.mark.parametrize(
+    ("table", "results"),
+    [
+        (
+            {
+                "study": "hierarchies",
+                "sweep": {"topology": ["chain", "star", "tree"], "scenario.robots": [2, 4]},
+            },
+            hierarchies(CHANCES),
+        ),
+        (
+            {"study": "ablation", "sweep": {"topology": ["chain", "star", "tree"]}},
+            ablation(dict.fromkeys(("chain", "star", "tree"), 0.5)),
+        ),
+        (
+            {"study": "wheel-failure", "scenario": {"failures": [SEIZED]}, "sweep": SWEPT},
+            wheel_failure(
+                {"fault": {"nothing": 0.1, "weights": 0.2, "self-model": 0.3, "both": 0.4}}
+            ),
+        ),
+    ],
+)
+def test_a_plan_counts_the_comparisons_of_the_study(table: dict, results: Arrays) -> None:
+    spec = na.Spec.of({**table, "seeds": 8, "episodes": 10, "steps": 4, "evaluation": 2})
+    planned = na.plan(spec, timed=False).comparisons
+    groups = load_study(spec.study).analyse(results.frames()).differences.values()
+    assert planned == sum(map(len, groups)) > 0
 
 
 def test_more_seeds_find_smaller_differences() -> None:
