@@ -197,7 +197,7 @@ def test_the_demo_draws_what_is_learned_first_and_then_the_first_episode(
     monkeypatch.setattr(StudyResults, "report", lambda study: report)
     assert main(["demo", "--out", str(tmp_path), "--jobs", "1"]) == 0
     printed, seen = capsys.readouterr()
-    assert seen.index("what the first trial has learned: ") < seen.index("of 32 trials")
+    assert seen.index("what the first trial has learned:") < seen.index("of 32 trials")
     assert len(drawn) == 2
     assert f"report  {report}\n" in printed
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
