@@ -89,8 +89,7 @@ class BoxPushing(Scenario):
             self.measures = (*MEASURES, ORIENTATION)
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
-        similar = settings.scaling == "similar"
-        self._unit = growth(settings.box, settings.robots) if similar else 1.0
+        self._unit = growth(settings.box, settings.robots) if settings.scaling == "similar" else 1.0
         self.farthest = self._unit * settings.termination_radius
         """Distance of the box from the goal beyond which an episode is broken off [m]."""
         robots = [self.robot] * settings.robots
@@ -112,8 +111,7 @@ class BoxPushing(Scenario):
         """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
         self.constants = CONSTANTS if settings.predictor == "push" else ()
         """Names of what the push predictor can calibrate; the other predictors have none."""
-        radii = [self.robot.radius] * settings.robots
-        self.levers: FloatArray = np.array([self.box.friction_radius, *radii])
+        self.levers = np.array([self.box.friction_radius, *[self.robot.radius] * settings.robots])
         """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
@@ -124,26 +122,24 @@ class BoxPushing(Scenario):
         )
         self._prediction = self._shared_settings()
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        # Robots that do not fit around the box, and state variables of users that fail, are refused
-        # now, not in the middle of a study.
+        # Robots without room at the box and state variables of users that fail are refused now.
         self._begin(0)
         if not self.space.is_built_in:
             self.states_at_rest()
 
     def _shared_settings(self) -> PredictionSettings:
         """Return the settings that all predictions share."""
-        settings = self.settings
         return PredictionSettings(
             groups=self.groups,
-            belief=PushBelief.of(self._model, self.world.robots, settings.belief.stiffness),
+            belief=PushBelief.of(self._model, self.world.robots, self.settings.belief.stiffness),
             space=self.space,
             action_set=self.action_set,
             increments=self._unit_speeds,
             limits=self._limits,
             task=self.task,
-            infrared=settings.infrared,
-            period=settings.period,
-            horizon=settings.prediction_horizon * CONTROL_PERIOD,
+            infrared=self.settings.infrared,
+            period=self.settings.period,
+            horizon=self.settings.prediction_horizon * CONTROL_PERIOD,
         )
 
     def partners(self) -> tuple[int, ...]:
@@ -158,15 +154,12 @@ class BoxPushing(Scenario):
         return tuple(group[k] for group in self.groups for k in opposite)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Place robots, box and goal by the start distribution; return states ``(n, d)``.
-
-        Failures are scheduled by the number of the `episode`.
-        """
+        """Begin an episode, whose number schedules failures; return states ``(n, d)``."""
         self._begin(seed, episode)
         return self.states_at_rest()
 
     def _begin(self, seed: int | np.random.SeedSequence, episode: int = 0) -> None:
-        """Place robots, box and goal, and schedule failures."""
+        """Place robots, box and goal by the start distribution, and schedule failures."""
         self._sensing = stream_of(seed, SENSING)
         rng = np.random.default_rng(seed)
         start = self.settings.start
@@ -182,8 +175,7 @@ class BoxPushing(Scenario):
 
     def states_at_rest(self) -> FloatArray:
         """Return the states ``(n, d)`` of all agents if the box has not moved."""
-        present = self._present(self.world.box_pose)
-        return self.states_at(present, self.commanded_speeds[None])[0]
+        return self.states_at(self._present(self.world.box_pose), self.commanded_speeds[None])[0]
 
     def commanded(self, speeds: FloatArray, joint_actions: IntArray) -> FloatArray:
         """Return the wheel speeds ``(..., n)`` that joint actions command, given those before."""

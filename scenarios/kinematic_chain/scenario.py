@@ -21,7 +21,7 @@ from ...core.interface.spaces import ActionSet
 from ...core.interface.stacked import StackedEnvironments
 from ...core.numerics import FloatArray, IntArray, working_seconds
 from ...core.plugins.words import expect
-from ...core.search.best_response import RespondingPrediction, Responses, Search
+from ...core.search.responding import RespondingPrediction, Responses, Search
 from ...core.values.rule_base import RuleBase
 from ..faults.settings import Failures
 from ..state_variables import find_variable, space_of

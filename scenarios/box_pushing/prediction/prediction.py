@@ -14,7 +14,7 @@ import numpy as np
 from ....core.interface.prediction import Assumptions, EmbodiedPrediction, Exploring
 from ....core.interface.spaces import ActionSet
 from ....core.numerics import FloatArray, IntArray, compile_ahead
-from ....core.search.best_response import RespondingPrediction, Responses, Search
+from ....core.search.responding import RespondingPrediction, Responses, Search
 from ....core.values.rule_base import RuleBase
 from ..states.kernel import progress_of
 from ..states.situations import SituationBatch
