@@ -271,6 +271,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "equal-computing-boxes",
         "equal-computing-arms",
         "equal-computing-arms-8",
+        "equal-computing-arms-16",
         "equal-computing-16",
         "equal-computing-32",
         "equal-computing-teams",
