@@ -212,10 +212,12 @@ def _results_of(
 
 def _trials_beside(path: Path) -> Path | None:
     """Return the exported trials of a table of exported episodes, if they are there unchanged."""
+    if path.stem != "episodes":
+        return None
     header = Header.in_folder_of(path)
     trials = path.with_stem("trials")
-    is_listed = path.stem == "episodes" and header is not None and path.name in header.files
-    return trials if is_listed and header is not None and header.has_unchanged(trials) else None
+    is_known = header is not None and path.name in header.files and header.has_unchanged(trials)
+    return trials if is_known else None
 
 
 def _of_table(table: ScoreTable, path: Path | None, roles: Roles, better: Better) -> StudyResults:
