@@ -113,8 +113,10 @@ def _size_key(columns: Columns, size: str | None, counted: Sequence[str]) -> str
     sizes = [key for key in numbers if key in counted] or [
         key for key in numbers if key.partition(".")[0] not in ("learner", "topology")
     ]
+    if not numbers:
+        raise SpecError("size: no number is swept, such as scenario.robots = [2, 4]")
     if len(sizes) != 1:
-        names = ", ".join(sizes or numbers) or "none"
+        names = ", ".join(sizes or numbers)
         raise SpecError(f"size: name the swept key that is the size; those of numbers: {names}")
     return sizes[0]
 
