@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import TypeVar
 
 from ...core.numerics import pd
@@ -205,6 +206,13 @@ class Scalability:
             yield f"From {format_estimate(size)} {data.size} on, {better} beats {worse}."
         if known:
             yield "These intervals are Student's over seeds, not adjusted for several pairs."
+        pairs = [*combinations(self.named, 2)]
+        apart = [pair for pair in pairs if len({*data.sizes(pair[0])} & {*data.sizes(pair[1])}) < 2]
+        if apart:
+            names = "; ".join(f"{one} and {two}" for one, two in apart)
+            yield f"No crossover can be found without two sizes that both have: {names}."
+        if len(apart) == len(pairs):
+            return
         other = "other " if known else ""
         between = " between them" if self.named != data.hierarchies else ""
         largest = f"{data.all_sizes[-1]:g} {data.size}"

@@ -182,12 +182,12 @@ def probability_of_best(values: Array) -> Array:
 
 
 def best_sizes(data: ScalabilityData) -> dict[str, tuple[float, float]]:
-    """Return by hierarchy the measured size of best mean performance, and how probable it is."""
+    """Return by hierarchy of several sizes that of best mean performance, and its probability."""
     best = {}
     for name in data.hierarchies:
         sizes = data.sizes(name)
         values = data.sign * paired([data.performances[name, n] for n in sizes])
-        if len(values) > 1:
+        if len(values) > 1 and len(sizes) > 1:
             k = int(values.mean(axis=0).argmax())
             best[name] = sizes[k], float(probability_of_best(values)[k])
     return best

@@ -87,6 +87,17 @@ def test_a_task_that_grows_out_of_proportion_has_no_speed_up(tmp_path):
     assert study.where("robots >= 2").scalability().data.scaling == "weak"
 
 
+@pytest.mark.parametrize(("sizes", "is_searched"), [((2, 8), False), ((2, 4), True)])
+def test_hierarchies_without_two_sizes_in_common_are_named(tmp_path, sizes, is_searched):
+    places = [("chain", 2), ("chain", 4), *(("star", n) for n in sizes)]
+    rows = [f"{name},{n},{seed},{seed * n / 40}" for name, n in places for seed in range(6)]
+    path = tmp_path / "scores.csv"
+    path.write_text("\n".join(["hierarchy,agents,seed,score", *rows]))
+    paragraph = load(path).scalability().paragraph
+    assert ("two sizes that both have: chain and star" in paragraph) != is_searched
+    assert ("There is no crossover" in paragraph) == is_searched
+
+
 def test_the_scaling_may_be_named():
     assert na.load(SCALING).scalability(scaling="strong").data.scaling == "strong"
     with pytest.raises(na.SpecError, match="scaling = 'other': allowed are strong, weak"):
