@@ -495,36 +495,37 @@ def success_by_size() -> Figure:
     return titled(figure, "The team's value lets teams scale to 16 robots")
 
 
-def steps_to_success(results: Results, condition: str) -> np.ndarray:
-    """Return mean decisions by seed; failed episodes count with the longest, 450."""
-    steps = results.values(condition, "steps", "evaluation")
-    return np.where(results.success(condition, "evaluation") == 1, steps, 450).mean(axis=1)
+def steps_to_success(study: na.StudyResults) -> dict[str, tuple[float, ...]]:
+    """Return mean decisions with intervals by condition; failed episodes count in full."""
+    lines = study.compare(measure="steps").table.lines
+    title = "evaluation steps to success"
+    return {line.condition: tuple(map(float, line.estimates[title])) for line in lines}
 
 
 def equal_computing() -> Figure:
     """Draw success and decisions to the goal by number of robots, for two budgets."""
     names = {"chain": "chain", "tree:2": "binary tree", "star": "star",
              "independent": "independent agents"}  # fmt: skip
-    small = load("equal-computing-boxes").results
-    large = {n: load(f"equal-computing-{n}").results for n in (16, 32)}
+    studies = {n: load(f"equal-computing-{n}") for n in ("boxes", 16, 32)}
+    steps = {n: steps_to_success(study) for n, study in studies.items()}
     titles = {64: "64 joint actions", 1024: "1,024 joint actions\n(32 robots: 4,096)"}
     figure = Figure(figsize=(WIDTH, 4.9), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey="row")
     for (above, below), (budget, title) in zip(panels.T, titles.items(), strict=True):
         for line, (name, label) in enumerate(names.items()):
             cells = {
-                n: (small, f"hierarchy, topology={name}, robots={n}, budget={budget}")
+                n: ("boxes", f"hierarchy, topology={name}, robots={n}, budget={budget}")
                 for n in (2, 4, 8)
             }
             if budget > 64:
-                cells |= {n: (results, name) for n, results in large.items()}
+                cells |= {n: (n, name) for n in (16, 32)}
             sizes = [n * (1 + 0.04 * (line - 1.5)) for n in cells]
-            draw_points(above, sizes, [success_of(*cell) for cell in cells.values()], line, label)
-            steps = [na.bootstrap(steps_to_success(*cell)) for cell in cells.values()]
-            draw_points(below, sizes, [tuple(map(float, e)) for e in steps], line, label)
+            success = [success_of(studies[n].results, c) for n, c in cells.values()]
+            draw_points(above, sizes, success, line, label)
+            draw_points(below, sizes, [steps[n][c] for n, c in cells.values()], line, label)
         above.set(title=title, ylim=(-0.03, 1.05))
         below.set_xscale("log", base=2)
-        ticks = (2, 4, 8, *large)
+        ticks = (2, 4, 8, 16, 32)
         below.set_xticks(ticks, [str(n) for n in ticks])
         below.set(xlabel="robots", ylim=(0, 450))
     panels[0, 0].set_ylabel("success")

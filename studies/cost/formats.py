@@ -49,7 +49,7 @@ SECTIONS: tuple[tuple[str, Headings, tuple[str, ...]], ...] = (
             "operations": "operations",
         },
         (
-            "joint actions: without the budget; tried: at most, within it;",
+            "joint actions: without the budget; tried: at most within it;",
             "operations: by Eq. 18 or 23 with the joint actions tried.",
         ),
     ),

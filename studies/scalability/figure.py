@@ -76,7 +76,7 @@ def _draw_efficiency(axes: Axes, report: Scalability) -> None:
     largest, highest = known.max(axis=0, initial=MAX_EFFICIENCY).tolist()
     axes.axhline(1.0, color="#888888", linewidth=0.8, ls=":")
     scaling = report.data.scaling
-    axes.set_ylabel(f"efficiency ({scaling} scaling)" if scaling else "efficiency (unknown)")
+    axes.set_ylabel(f"efficiency ({scaling} scaling)" if scaling else "efficiency (left out)")
     axes.set_ylim(0.0, 1.1 * min(highest, 2.0 * largest))
 
 

@@ -182,7 +182,7 @@ def probability_of_best(values: Array) -> Array:
 
 
 def best_sizes(data: ScalabilityData) -> dict[str, tuple[float, float]]:
-    """Return by hierarchy of several sizes that of best mean performance, and its probability."""
+    """Return the size of best performance and its probability, of hierarchies with several."""
     best = {}
     for name in data.hierarchies:
         sizes = data.sizes(name)

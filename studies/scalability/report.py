@@ -134,18 +134,16 @@ def analyze(
 def _scaling_of(
     results: Results, settings: Mapping[str, ConditionSettings], size: str | None
 ) -> tuple[Scaling | None, str]:
-    """Return whether the task grows in proportion to the team, see `collect`, and a remark."""
-    places = SizeAxis.of(results, size).places
-    tasks = {
-        n: settings[label].scenario.task_size
-        for label, (_, n) in places.items()
-        if label in settings
-    }
-    known = {n: task for n, task in tasks.items() if task is not None}
-    if not known or len(known) < len(tasks):
+    """Return how the task grows with the team in every group, see `collect`, and a remark."""
+    groups = [
+        {n: settings[label].scenario.task_size for label, n in sizes.items() if label in settings}
+        for sizes in SizeAxis.of(results, size).groups().values()
+    ]
+    known = [{n: task for n, task in own.items() if task is not None} for own in groups]
+    if known != groups or not any(groups):
         return "strong", ASSUMED
-    if len({*known.values()}) == 1:
+    if all(len({*own.values()}) <= 1 for own in known):
         return "strong", ""
-    if len({round(task / n, 9) for n, task in known.items()}) == 1:
+    if all(len({round(task / n, 9) for n, task in own.items()}) <= 1 for own in known):
         return "weak", ""
     return None, NOT_PROPORTIONAL

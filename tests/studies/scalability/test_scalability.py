@@ -87,6 +87,21 @@ def test_a_task_that_grows_out_of_proportion_has_no_speed_up(tmp_path):
     assert study.where("robots >= 2").scalability().data.scaling == "weak"
 
 
+def test_tasks_of_one_size_count_in_every_group_of_conditions(tmp_path):
+    corners = [[-0.4, -0.4], [0.4, -0.4], [0.4, 0.4], [-0.4, 0.4]]
+    boxes = ["square", {"name": "fixed", "vertices": corners}]  # only the first one grows
+    sweep = {"scenario.robots": [2, 4], "scenario.box": boxes}
+    steps = {"steps": 2, "evaluation": 1, "episodes": 1, "preset": "random"}
+    study = na.run(
+        steps | {"study": "scaling", "seeds": 2, "sweep": sweep},
+        tmp_path / "out",
+        jobs=1,
+        progress=False,
+    )
+    assert study.scalability().data.scaling is None
+    assert study.where("box == 'square'").scalability().data.scaling == "weak"
+
+
 @pytest.mark.parametrize(("sizes", "is_searched"), [((2, 8), False), ((2, 4), True)])
 def test_hierarchies_without_two_sizes_in_common_are_named(tmp_path, sizes, is_searched):
     places = [("chain", 2), ("chain", 4), *(("star", n) for n in sizes)]
