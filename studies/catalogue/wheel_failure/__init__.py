@@ -5,8 +5,8 @@ Agents that leave (``kind = "left"`` of ``topology.failures``) also count as a f
 Training continues through the failure. At its onset the team is copied, and the copy continues with
 fixed weights under the same initial states and exploration. A sweep over
 ``learner.self_model.enabled`` gives four cases of adaptation: nothing, the weights, the self-model,
-which corrects predictions, or both. Without that sweep, the share of seeds that recover in training
-is compared with that of the first condition.
+which corrects predictions, or both. Without that sweep the team that learns is compared with the
+copy, and the share of seeds that recover in training with that of the first condition.
 
 Levels are success rates over `BLOCK` episodes: before the failure, just after its onset, after its
 end if it ends, and at the end of training. Recovery and loss are relative to the level of each
@@ -119,11 +119,11 @@ def check(spec: Spec) -> None:
 
 
 def comparisons(spec: Spec) -> int:
-    """Return the number of comparisons: with nothing adapting, or with the first condition."""
+    """Return the number of comparisons of success at the end, with the team that adapts least."""
     cases = [_fault_of(c.label, c.columns) for c in spec.conditions()]
     faults = {fault for fault, enabled in cases if enabled == "false"}
     adapting = [1 if enabled == "false" else 2 for fault, enabled in cases if fault in faults]
-    return sum(adapting) or len(cases) - 1
+    return sum(adapting) or len(cases)
 
 
 def _fault_of(condition: str, columns: SpecTable) -> tuple[str, str]:
@@ -189,19 +189,22 @@ class Course(NamedTuple):
 def analyse(results: Results) -> Analysis:
     """Estimate and compare with 95% intervals, with seeds as the unit of sampling.
 
-    If self-models are swept, success at the end is compared with the case without adaptation;
-    otherwise recovery in training is compared with that of the first condition.
+    Success at the end is compared with the case without adaptation, or, if self-models are not
+    swept, with weights kept; then recovery in training, too, with that of the first condition.
     """
     courses = courses_of(results)
     if not courses:
         return Analysis(())
-    if any(course.adapts == "nothing" for course in courses):
-        notes = ["Rows: condition, then the parts that adapt to its failure."]
-        gains, lines = judged({AT_END: _gains(courses)}, "nothing adapting")
-    else:
+    least = courses[0].adapts
+    reference = least if least == KEPT else f"{least} adapting"
+    differences, lines = judged({AT_END: _gains(courses, least)}, reference)
+    notes = ["Rows: condition, then the parts that adapt to its failure."]
+    if least == KEPT:
         notes = ["Rows: condition, then whether training continues or weights are kept."]
         pairs = {RECOVERED.heading: _recoveries(courses)}
-        gains, lines = judged(pairs, courses[0].fault, RECOVERED)
+        recovered, more = judged(pairs, courses[0].fault, RECOVERED)
+        differences |= recovered
+        lines += more
     if not all(course.measured.had_success.all() for course in courses):
         notes += _unmeasured(courses)
     if any(course.measured.had_success.any() for course in courses):
@@ -209,7 +212,7 @@ def analyse(results: Results) -> Analysis:
     if any(course.end is not None for course in courses):
         notes.append("Recovery after the end of a failure is not adaptation.")
     table = tuple(course.summary for course in courses)
-    return Analysis(table, (*notes, *lines), courses, gains)
+    return Analysis(table, (*notes, *lines), courses, differences)
 
 
 def _unmeasured(courses: Sequence[Course]) -> Iterator[str]:
@@ -263,15 +266,15 @@ def _failure_spans(numbers: Mapping[str, Array]) -> tuple[FailureSpan, ...]:
     return tuple(spans)
 
 
-def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
-    """Yield each case paired with that of the same fault without adaptation."""
+def _gains(courses: Sequence[Course], least: str) -> Iterator[Pair]:
+    """Yield each case paired with that of the same fault in which `least` adapts."""
     ends = {
         (c.fault, c.adapts): pd.Series(c.measured.end.mean(axis=1), c.measured.seeds)
         for c in courses
     }
     for (fault, adapts), end in ends.items():
-        if adapts != "nothing" and (fault, "nothing") in ends:
-            yield f"{fault}, {adapts}", AT_END, end, ends[fault, "nothing"]
+        if adapts != least and (fault, least) in ends:
+            yield f"{fault}: {adapts}", AT_END, end, ends[fault, least]
 
 
 def _recoveries(courses: Sequence[Course]) -> Iterator[Pair]:

@@ -19,6 +19,8 @@ from nested_agents.studies.catalogue.wheel_failure import (
 )
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.report.sentences import condition_sentences
 from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.measured import default_measure
 from nested_agents.studies.results.recovery import (
@@ -164,8 +166,25 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
     assert ends["4 wheels, seized: nothing"] < 0.2
     gains = {gain.condition: gain for gain in analysis.differences[AT_END]}
     assert len(gains) == 6
-    assert gains["4 wheels, seized, both"].p < 0.001
-    assert gains["2 wheels, seized, both"].p == 1.0
+    assert gains["4 wheels, seized: both"].p < 0.001
+    assert gains["2 wheels, seized: both"].p == 1.0
+
+
+def test_training_is_compared_with_kept_weights_where_no_self_model_is_swept() -> None:
+    """Both cases of each fault share their seeds; how often teams recover is a second question."""
+    made = wheel_failure(ENDS)
+    for columns in made.columns.values():
+        del columns[module.SWEPT]
+    analysis = analyse(made.frames())
+    gains = {gain.condition: gain for gain in analysis.differences[AT_END]}
+    assert set(gains) == {f"{condition}: training" for condition in made.columns}
+    ends = {line.condition: float(line.estimates[AT_END].value) for line in analysis.table}
+    for condition in made.columns:
+        gain = float(gains[f"{condition}: training"].estimate.value)
+        kept = ends[f"{condition}: {KEPT}"]
+        assert gain == pytest.approx(ends[f"{condition}: training"] - kept)
+    sentences = condition_sentences(tabulate(analysis.table), AT_END, analysis)
+    assert ["difference in" in text for text in sentences] == [False, True] * len(made.columns)
 
 
 def test_what_never_succeeded_has_nothing_to_recover() -> None:
@@ -249,7 +268,8 @@ def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) ->
     if faults is None:  # nothing is said of self-models
         assert {adapts for _, adapts in found} == {"training", KEPT}
         assert {fault for fault, _ in found} == set(results.training)
-        assert AT_END not in analysis.differences
+        gains = [difference.condition for difference in analysis.differences[AT_END]]
+        assert gains == [f"{fault}: training" for fault in results.training]
     else:
         cases = ("nothing", "weights", "self-model", "both")
         assert found == [(fault, adapts) for fault in faults for adapts in cases]
