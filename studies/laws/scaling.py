@@ -247,7 +247,7 @@ def decisions_to_criterion(
         if not results.has(condition, "training", measure):
             continue
         reached = results.values(condition, measure).astype(float)
-        spent = results.values(condition, "steps").cumsum(axis=1)
+        spent = np.nancumsum(results.values(condition, "steps"), axis=1)  # rows may be padded
         width = min(WINDOW, reached.shape[1])
         means = np.lib.stride_tricks.sliding_window_view(reached, width, axis=1).mean(axis=2)
         is_there = means >= criterion - 1e-12

@@ -17,7 +17,6 @@ from .differences import MIN_RUNS, Difference, Pair, count_unpaired, differences
 from .notation import listed, wrapped
 from .permutation_tests import LEVEL
 from .power_text import independent_power_lines, power_lines
-from .recovery import is_over_episodes
 from .results import STEPS, Results, row_means
 from .statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate
 
@@ -189,7 +188,7 @@ def verdicts(
     title = title or " or ".join(dict.fromkeys(d.measure for d in compared))
     samples = [d.sample for d in compared if d.paired]
     independent = [d.values for d in compared if not d.paired]
-    lines += power_lines(samples, title, of_rates=is_over_episodes(measure))
+    lines += power_lines(samples, measure, title)
     return lines + independent_power_lines(independent, len(compared), title)
 
 

@@ -26,7 +26,7 @@ from .differences import (
 from .measured import default_measure, title_of, values_by_seed, values_of
 from .notation import listed, wrapped
 from .power_text import power_lines
-from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME, is_over_episodes
+from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME
 from .results import STEPS, Results, row_means
 from .statistics import Array, Estimate, exactly
 
@@ -229,7 +229,7 @@ def power_with_first(results: Results) -> tuple[str, ...]:
     base, *others = (values[c] for c in results.columns if c in values)
     pairs = [select_shared([own, base]) for own in others]
     samples = [own - reference for own, reference in pairs if len(own) >= MIN_RUNS]
-    return tuple(power_lines(samples, title_of(measure, phase), of_rates=is_over_episodes(measure)))
+    return tuple(power_lines(samples, measure, title_of(measure, phase)))
 
 
 def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[BySeed, BySeed]:

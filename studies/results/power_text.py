@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from textwrap import wrap
 
+from ...core.interface.measures import SUCCESS, Measure
 from ..errors import WIDTH
 from .notation import format_number, wrapped
 from .permutation_tests import LEVEL
@@ -16,6 +17,7 @@ from .power import (
     seeds_for,
     seeds_needed,
 )
+from .recovery import is_over_episodes
 from .statistics import Array
 
 
@@ -110,7 +112,9 @@ def planned_text(
     return [*known, *wrap(text, WIDTH)]
 
 
-def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool = True) -> list[str]:
+def power_lines(
+    samples: Sequence[Array], measure: Measure = SUCCESS, title: str = ""
+) -> list[str]:
     """Return lines on which differences comparisons could find, and how many seeds it takes.
 
     Parameters
@@ -119,17 +123,18 @@ def power_lines(samples: Sequence[Array], measure: str = "", *, of_rates: bool =
         Differences of single seeds ``(n_seeds,)``, by comparison: all that were adjusted together,
         of one unit.
     measure
-        By what conditions are compared.
-    of_rates
-        Whether they are differences of success rates, of which `SMALLEST` is of interest.
+        By what conditions are compared. Of success rates, `SMALLEST` is of interest.
+    title
+        Its title in the lines.
     """
     if not samples:
         return []
+    of_rates = is_over_episodes(measure)
     deviation = deviation_of(samples, of_rates=of_rates)
     smallest = SMALLEST if of_rates else None
-    most = 1.0 if of_rates else math.inf
+    least, greatest = measure.bounds
     seeds = min(map(len, samples))
-    return power_text(seeds, len(samples), deviation, smallest, measure, most=most)
+    return power_text(seeds, len(samples), deviation, smallest, title, most=greatest - least)
 
 
 def independent_power_lines(

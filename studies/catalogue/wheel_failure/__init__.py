@@ -40,7 +40,7 @@ from ...results.recovery import (
     failure_course,
 )
 from ...results.results import KEPT, Results
-from ...results.statistics import Array, bootstrap, exactly, rate
+from ...results.statistics import Array, Estimate, exactly, rate, stack_estimates
 from ...spec.spec import Spec
 from ...spec.tables import SpecTable, label_but
 from ...trials.arrangement import arrange
@@ -292,8 +292,8 @@ def _recoveries(courses: Sequence[Course]) -> Iterator[Pair]:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure of success by episode with a panel for each fault.
 
-    Lines are running means over seeds and episodes for each case of adaptation, with bands of 95%
-    intervals. Black lines mark the onset of failures, hatched areas transient failures.
+    Lines are success rates over seeds and `SMOOTHED` episodes for each case of adaptation, with
+    bands of 95% intervals. Black lines mark the onset of failures, hatched areas transient failures.
     """
     from matplotlib.patches import Patch  # matplotlib takes its time
 
@@ -315,7 +315,7 @@ def draw(analysis: Analysis) -> Figures:
         for course in own:
             success = course.measured.success
             cuts = {episode for span in course.spans for episode in span if episode is not None}
-            curve = bootstrap(_smoothed(success, sorted(cuts)), bounds=(0, 1))
+            curve = _curve(success, sorted(cuts))
             episodes = range(len(curve.value))  # counted from 0, as in rows and specs
             f.draw_curve(axes, episodes, curve, cases.index(course.adapts), alpha=0.1)
         axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
@@ -334,8 +334,8 @@ def draw(analysis: Analysis) -> Figures:
     return {"wheel-failure": figure}
 
 
-def _smoothed(success: Array, cuts: Sequence[int]) -> Array:
-    """Return running means over the last episodes that do not extend across `cuts`."""
-    segments = (pd.DataFrame(part.T) for part in np.split(success, cuts, axis=1))
-    means = [part.rolling(SMOOTHED, min_periods=1).mean() for part in segments if len(part)]
-    return np.asarray(pd.concat(means).T)
+def _curve(success: Array, cuts: Sequence[int]) -> Estimate:
+    """Return rates ``(n_episodes,)`` of the last `SMOOTHED` episodes that do not cross `cuts`."""
+    starts = [max((cut for cut in (0, *cuts) if cut <= k)) for k in range(success.shape[1])]
+    windows = (success[:, max(start, k - SMOOTHED + 1) : k + 1] for k, start in enumerate(starts))
+    return stack_estimates([rate(window) for window in windows])

@@ -55,6 +55,19 @@ def test_runs_that_never_reach_it_are_censored() -> None:
     assert "no law: no run reached the criterion: all are censored" in " ".join(never.notes)
 
 
+def test_runs_of_fewer_episodes_are_censored_where_they_end() -> None:
+    """Teams that train for a number of decisions differ in episodes; none may be left out."""
+    whole = made_up({"chain": 3.0})
+    rows = whole.episodes
+    shorter = (rows["seed"] == 1) & (rows["condition"] == "chain, robots=8") & (rows["episode"] >= 10)
+    ragged = scaling_law(replace(whole, episodes=rows[~shorter]), "success", criterion=1.0)
+    law, expected = ragged.fits["chain"], scaling_law(whole, "success", criterion=1.0).fits["chain"]
+    assert law.left_out == 0
+    assert law.sample.censored.tolist() == expected.sample.censored.tolist()
+    assert law.sample.censored[1, 2]
+    assert np.exp(law.sample.values[1, 2]) == pytest.approx(10 * 80)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.core.interface.measures import SUCCESS
+from nested_agents.core.interface.measures import RETURN, SUCCESS
 from nested_agents.studies.results import permutation_tests
 from nested_agents.studies.results.analysis import verdict_lines
 from nested_agents.studies.results.differences import Difference, adjust
@@ -143,7 +143,7 @@ def test_without_deviation_nothing_is_promised() -> None:
 def test_no_difference_of_rates_beyond_one_is_promised() -> None:
     samples = [np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])]
     assert "detect no difference with power" in power_lines(samples)[0]
-    assert "detect a difference of" in power_lines(samples, of_rates=False)[0]
+    assert "detect a difference of" in power_lines(samples, RETURN)[0]
 
 
 def test_a_difference_of_rounding_errors_is_none() -> None:
@@ -199,7 +199,7 @@ def test_power_far_out_where_scipy_has_no_number_is_that_of_simulated_studies() 
 
 def test_differences_that_are_equal_except_for_rounding_have_no_power() -> None:
     base = np.linspace(-3.0, 4.0, 8)
-    lines = power_lines([(base + 0.5) - base], "score", of_rates=False)
+    lines = power_lines([(base + 0.5) - base], RETURN, "score")
     assert " ".join(lines).startswith("Power: unknown in score, because all seeds have the same")
 
 
