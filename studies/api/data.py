@@ -21,10 +21,11 @@ from ...core.plugins.sources import Sources
 from ...core.plugins.words import closest
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
+from ..laws.size_axis import key_beside_size
 from ..presentation.headlines import below_random, headlines
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.choices import choose_trials
-from ..results.comparison import compare_conditions, missing_reference, power_with_first
+from ..results.comparison import compare_conditions, missing_reference, power_of_seeds
 from ..results.joining import join_sizes
 from ..results.measured import default_measure
 from ..results.notation import wrapped
@@ -124,9 +125,11 @@ class StudyData:
 
     @property
     def power(self) -> tuple[str, ...]:
-        """Power of comparisons with the first condition, as in `compare`."""
+        """Power of the comparisons that `compare` makes by default."""
         is_own = self.results.measures and self.results.main.name in (SUCCESS.name, RETURN.name)
-        return power_with_first(self.results) if is_own and self.results.phases else ()
+        if not is_own or not self.results.phases:
+            return ()
+        return power_of_seeds(self.results, key_beside_size(self.results))
 
     @cached_property
     def analysis(self) -> Any:
@@ -147,8 +150,9 @@ class StudyData:
         Parameters
         ----------
         by
-            A swept key, or its last part: compares conditions that differ only in this key. None or
-            ``condition``: compares all conditions with the first.
+            A swept key, or its last part: compares conditions that differ only in this key.
+            ``condition``: compares all conditions with the first. By default the key that is swept
+            besides the team size, if there is one such key and no reference; else ``condition``.
         measure
             Name of a measure of episodes, ``steps``, ``return``, or a number of whole trials. By
             default the first measure: success, or the return if nothing is a success. Of a study
@@ -164,7 +168,7 @@ class StudyData:
             If there is no such key, measure, phase or reference.
         """
         own_measure, default_by = self._defaults
-        by = by or default_by
+        by = by or default_by or (None if reference else key_beside_size(self.results))
         key = None if by == "condition" else by
         usual = default_measure(self.results) if phase is None else self.results.main.name
         name = measure or own_measure or usual

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import SpecError, refused
+from ..laws.size_axis import other_key
 from ..results.analysis import Analysis, Figures, identity_lines
 from ..results.results import Results
 from ..spec.studies import STUDIES
@@ -57,8 +58,14 @@ class Study:
         """Raise `SpecError` if the spec does not fit the study."""
 
     def comparisons(self, spec: Spec) -> int:
-        """Return the number of comparisons over which p is adjusted; by default with the first."""
-        return len(spec.conditions()) - 1
+        """Return the number of comparisons over which p is adjusted.
+
+        By default they are those of `compare`: with the first condition, or within each size.
+        """
+        columns = {condition.label: condition.columns for condition in spec.conditions()}
+        by = other_key(columns)
+        groups = {repr([row[k] for k in row if by and k != by]) for row in columns.values()}
+        return len(columns) - len(groups)
 
     def measure(self, trial: Trial) -> TrialResult:
         """Run one trial; imported by name in worker processes."""

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.plugins.words import closest, show
+from ...core.plugins.words import show
 from ..errors import SpecError
 from ..results.results import Results
 from ..results.score_tables import NUMBER
 from ..results.sizes import Sizes
-from ..spec.tables import label_but
+from ..spec.tables import key_named, label_but
 
 MAX_SIZE = 1_000_000_000
 """Maximum size that is fitted or predicted."""
@@ -62,9 +62,7 @@ class SizeAxis(NamedTuple):
             `MAX_SIZE`; one line.
         """
         columns = columns_of(results)
-        is_counted = all("robots" in results.numbers(c) for c in results.conditions)
-        counted = Sizes.of(results, results.conditions).keys if is_counted else ()
-        return cls.by(_size_key(columns, size, counted), columns)
+        return cls.by(_size_key(columns, size, _counted(results)), columns)
 
     @classmethod
     def by(cls, key: str, columns: Columns) -> SizeAxis:
@@ -84,6 +82,31 @@ def columns_of(results: Results) -> Columns:
     if any(results.columns.values()):
         return results.columns
     return {condition: {"condition": condition} for condition in results.columns}
+
+
+def key_beside_size(results: Results) -> str | None:
+    """Return the `other_key` of results."""
+    return other_key(results.columns, _counted(results))
+
+
+def other_key(columns: Columns, counted: Sequence[str] = ()) -> str | None:
+    """Return the only key that is swept besides the size, by which conditions are compared.
+
+    None if no size is swept, or not exactly one key besides. `counted` are the swept keys that
+    are the number of bodies, where that is known.
+    """
+    try:
+        size = _size_key(columns, None, counted)
+    except SpecError:
+        return None
+    others = {key for row in columns.values() for key in row} - {size}
+    return others.pop() if len(others) == 1 else None
+
+
+def _counted(results: Results) -> Sequence[str]:
+    """Return the swept keys that are the number of bodies, if trials counted them."""
+    is_counted = all("robots" in results.numbers(c) for c in results.conditions)
+    return Sizes.of(results, results.conditions).keys if is_counted else ()
 
 
 def check_size(name: str, size: float, where: str = "") -> None:
@@ -106,10 +129,7 @@ def _size_key(columns: Columns, size: str | None, counted: Sequence[str]) -> str
     levels = {key: [row.get(key) for row in columns.values()] for key in keys}
     numbers = [k for k, own in levels.items() if all(map(_is_number, own)) and len({*own}) > 1]
     if size is not None:
-        key = next((k for k in numbers if size in (k, k.rpartition(".")[2])), None)
-        if key is None:
-            raise SpecError(f"size = {size!r}: {closest(size, numbers)}; a swept key of numbers")
-        return key
+        return key_named("size", size, numbers)
     sizes = [key for key in numbers if key in counted] or [
         key for key in numbers if key.partition(".")[0] not in ("learner", "topology")
     ]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
-from ..laws.size_axis import SizeAxis
+from ..laws.size_axis import key_beside_size
 from ..presentation.headlines import below_random, headlines
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable, tabulate
@@ -110,19 +110,9 @@ def _notes(results: Results, analysis: Analysis) -> tuple[str, ...]:
     """Return the notes of a study, or those of a comparison if it has none of its own."""
     notes = notes_of(analysis)
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        by = _key_beside_size(results)
+        by = key_beside_size(results)
         notes = compare_conditions(results, results.main.name, by=by).notes  # with identity lines
     return (*missing_reference(results), *notes)
-
-
-def _key_beside_size(results: Results) -> str | None:
-    """Return the key that is swept besides the team size; None if there is not exactly one."""
-    with suppress(SpecError):  # no size
-        size = SizeAxis.of(results).key
-        others = {key for row in results.columns.values() for key in row} - {size}
-        if len(others) == 1:
-            return others.pop()
-    return None
 
 
 def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> ScalabilityReport | None:

@@ -12,7 +12,7 @@ from ...core.interface.measures import RETURN, SUCCESS, Measure
 from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
-from ..spec.tables import SpecTable, aliases, label, named
+from ..spec.tables import SpecTable, aliases, key_named, label, named
 from .analysis import NOTHING, UNPAIRED, Summary, identity_lines, mean_estimate, verdicts
 from .differences import (
     MIN_RUNS,
@@ -220,15 +220,19 @@ def missing_reference(results: Results) -> list[str]:
     )
 
 
-def power_with_first(results: Results) -> tuple[str, ...]:
-    """Return lines on which differences from the first condition the seeds detect.
+def power_of_seeds(results: Results, by: str | None) -> tuple[str, ...]:
+    """Return lines on which differences the seeds detect.
 
     They agree with those of `compare_conditions`, which takes seconds for thousands of seeds.
     """
     measure, values, phase = values_of(results, default_measure(results))
-    base, *others = (values[c] for c in results.columns if c in values)
-    pairs = [select_shared([own, base]) for own in others]
-    samples = [own - reference for own, reference in pairs if len(own) >= MIN_RUNS]
+    groups = _groups([c for c in results.columns if c in values], results.columns, by, None)
+    pairs = [
+        select_shared([values[condition], values[reference]])
+        for reference, *others in (list(members.values()) for members in groups.values())
+        for condition in others
+    ]
+    samples = [own - base for own, base in pairs if len(own) >= MIN_RUNS]
     return tuple(power_lines(samples, measure, title_of(measure, phase)))
 
 
@@ -270,10 +274,7 @@ def _groups(
 ) -> dict[str, Members]:
     """Return the members of each group by its setting, the reference first."""
     keys = dict.fromkeys(key for c in conditions for key in columns[c])
-    key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
-    if by is not None and key is None:
-        without = "without it, all conditions are compared with the first"
-        raise SpecError(f"by = {by!r}: {closest(by, keys)}; {without}")
+    key = None if by is None else key_named("by", by, keys)
     groups: dict[str, Members] = {}
     known = {}
     for c in conditions:

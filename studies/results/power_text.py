@@ -112,9 +112,7 @@ def planned_text(
     return [*known, *wrap(text, WIDTH)]
 
 
-def power_lines(
-    samples: Sequence[Array], measure: Measure = SUCCESS, title: str = ""
-) -> list[str]:
+def power_lines(samples: Sequence[Array], measure: Measure = SUCCESS, title: str = "") -> list[str]:
     """Return lines on which differences comparisons could find, and how many seeds it takes.
 
     Parameters

@@ -9,13 +9,13 @@ import itertools
 import re
 import tomllib
 import typing
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from ...core.plugins.words import show
+from ...core.plugins.words import closest, show
 from ..errors import SpecError
 from ..store.database import SPEC_FILE
 from ..store.durable import read_text
@@ -204,6 +204,27 @@ def named(name: str, known: Mapping[str, Collection[str]]) -> str | None:
     if name in known:
         return name
     return labels[0] if len(labels) == 1 else None
+
+
+def key_named(option: str, name: str, keys: Iterable[str]) -> str:
+    """Return the key that is called by a name: the whole key, or its last part.
+
+    Raises
+    ------
+    SpecError
+        If there is no such key, or several end so; it names the option.
+
+    Examples
+    --------
+    >>> key_named("by", "robots", ["scenario.robots", "topology"])
+    'scenario.robots'
+    """
+    known = [*keys]
+    ending = [key for key in known if key.rpartition(".")[2] == name]
+    if name in known or len(ending) == 1:
+        return name if name in known else ending[0]
+    hint = f"say which: {', '.join(ending)}" if ending else closest(name, known)
+    raise SpecError(f"{option} = {name!r}: {hint}")
 
 
 def label_but(columns: SpecTable, keys: Collection[str]) -> str:

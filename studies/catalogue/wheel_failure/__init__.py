@@ -293,7 +293,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure of success by episode with a panel for each fault.
 
     Lines are success rates over seeds and `SMOOTHED` episodes for each case of adaptation, with
-    bands of 95% intervals. Black lines mark the onset of failures, hatched areas transient failures.
+    bands of 95% intervals. Black lines mark the onset of failures, hatched areas failures that end.
     """
     from matplotlib.patches import Patch  # matplotlib takes its time
 
@@ -336,6 +336,6 @@ def draw(analysis: Analysis) -> Figures:
 
 def _curve(success: Array, cuts: Sequence[int]) -> Estimate:
     """Return rates ``(n_episodes,)`` of the last `SMOOTHED` episodes that do not cross `cuts`."""
-    starts = [max((cut for cut in (0, *cuts) if cut <= k)) for k in range(success.shape[1])]
+    starts = [max(cut for cut in (0, *cuts) if cut <= k) for k in range(success.shape[1])]
     windows = (success[:, max(start, k - SMOOTHED + 1) : k + 1] for k, start in enumerate(starts))
     return stack_estimates([rate(window) for window in windows])

@@ -59,9 +59,13 @@ def test_runs_of_fewer_episodes_are_censored_where_they_end() -> None:
     """Teams that train for a number of decisions differ in episodes; none may be left out."""
     whole = made_up({"chain": 3.0})
     rows = whole.episodes
-    shorter = (rows["seed"] == 1) & (rows["condition"] == "chain, robots=8") & (rows["episode"] >= 10)
-    ragged = scaling_law(replace(whole, episodes=rows[~shorter]), "success", criterion=1.0)
-    law, expected = ragged.fits["chain"], scaling_law(whole, "success", criterion=1.0).fits["chain"]
+    shorter = (
+        (rows["seed"] == 1) & (rows["condition"] == "chain, robots=8") & (rows["episode"] >= 10)
+    )
+    ragged = replace(whole, episodes=rows[~shorter])
+    law, expected = (
+        scaling_law(results, "success", criterion=1.0).fits["chain"] for results in (ragged, whole)
+    )
     assert law.left_out == 0
     assert law.sample.censored.tolist() == expected.sample.censored.tolist()
     assert law.sample.censored[1, 2]

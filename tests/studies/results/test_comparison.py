@@ -91,7 +91,7 @@ def test_numbers_of_whole_trials_are_compared_too() -> None:
     [
         ({"measure": "sucess"}, "measure = 'sucess': did you mean 'success'"),
         ({"phase": "evaluating"}, "phase = 'evaluating': did you mean 'evaluation'"),
-        ({"by": "topolgy"}, "by = 'topolgy': did you mean 'topology'.* without it"),
+        ({"by": "topolgy"}, "by = 'topolgy': did you mean 'topology'"),
         ({"by": "topology", "reference": "ring"}, "reference = 'ring': known: chain, star"),
     ],
 )
