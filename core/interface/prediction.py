@@ -41,6 +41,10 @@ class Prediction(ABC):
     repeats: bool = False
     """Whether agents are assumed to repeat their action in all decisions after the first. If not,
     they take the neutral action. See `nested_agents.core.interface.abilities.PredictsAhead`."""
+    is_constant: bool = False
+    """Whether predictions are the same in every state, as in a repeated game."""
+    is_given: bool = False
+    """Whether a decision has used this object; the next decision gets a copy."""
 
     @cached_property
     def alike(self) -> IntArray | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
+from copy import copy, deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
@@ -195,6 +195,9 @@ def unwrapped(scenario: Scenario) -> Scenario:
 def prediction_of(scenario: Scenario) -> Prediction:
     """Return the prediction from the present state; `UNPREDICTED` without a predictor.
 
+    It is another object at every call, also of scenarios that predict themselves, unless it is
+    constant: agents share what an object has predicted.
+
     Raises
     ------
     ValueError
@@ -204,6 +207,11 @@ def prediction_of(scenario: Scenario) -> Prediction:
     if prediction is None:
         return UNPREDICTED
     if isinstance(prediction, Prediction):
+        if prediction.is_constant:
+            return prediction
+        if prediction.is_given:
+            return copy(prediction)
+        object.__setattr__(prediction, "is_given", True)  # also of a frozen dataclass
         return prediction
     raise ValueError(
         f"scenario.predict() returned {type(prediction).__name__}, allowed: None or an instance of "

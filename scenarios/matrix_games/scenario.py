@@ -181,6 +181,7 @@ class MatrixGame(Scenario, Prediction):
     (11.0, -30.0)
     """
 
+    is_constant = True
     measures = (*OPTIMALITY, Measure("payoff", "mean payoff", gathering="mean", better="higher"))
 
     def __init__(self, settings: MatrixGameSettings) -> None:
