@@ -20,8 +20,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from ....core.agents.team import Team
 from ....core.learners.learner import LearnerSettings
 from ....core.learners.td import FrozenSettings
