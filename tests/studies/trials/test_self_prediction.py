@@ -9,7 +9,7 @@ from nested_agents.studies.catalogue.learning_curve import measure
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
 
-MEETING = '''
+MEETING = """
 import copy
 import numpy as np
 import nested_agents as na
@@ -63,7 +63,7 @@ class Ahead(na.Prediction):
 
     def rewards(self, joint_actions):
         return self.world.rewards(joint_actions)
-'''
+"""
 EVALUATORS = ("auto", "exact", "sampling", "best-response")
 DECIDING = [
     *({"decision": {"evaluator": name, "rule": "reward-and-value"}} for name in EVALUATORS),
