@@ -54,7 +54,7 @@ def without_figures() -> None:
     """Draw nothing: figures are of what has been verified, and take most time."""
     learning_curve.draw = lambda analysis: {}
     explaining.draw = lambda explanation: {}
-    page.hierarchy_pictures = lambda *_: []
+    page.hierarchy_pictures = lambda *_: ([], "")
 
 
 @cache

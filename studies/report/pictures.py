@@ -15,6 +15,7 @@ from matplotlib.transforms import Bbox, BboxBase
 
 from ...core.fonts import cover_text
 from ...topologies.drawing import picture
+from ...topologies.view import HierarchyView
 from ..errors import SpecError
 from ..presentation.figures import apply_style
 from ..store.store import Store
@@ -115,19 +116,25 @@ def embed(svg: str, prefix: str) -> str:
     return svg.replace("<svg", f'<svg id="{prefix}"', 1)
 
 
-def hierarchy_pictures(store: Store) -> list[Picture]:
-    """Return pictures of the first hierarchies of a study.
+def hierarchy_pictures(store: Store) -> tuple[list[Picture], str]:
+    """Return pictures of the first hierarchies of a study, and a remark if there are more.
 
     Hierarchies that cannot be built here are omitted: those of studies of another version, or of
     files that are not trusted.
     """
-    drawings: dict[str, Figure] = {}
+    views: list[HierarchyView] = []
     with suppress(SpecError):
         spec = spec_of(store)
         with spec.sources.active():
-            for view in hierarchies_of(spec, MAX_HIERARCHIES):
-                if len(view.hierarchy) <= MAX_AGENTS:
-                    drawings[view.title] = picture(
-                        view.hierarchy, bodies=view.bodies, failing=view.failing
-                    )
-    return pictures(drawings, "hierarchy")
+            views = hierarchies_of(spec)
+    small = [view for view in views if len(view.hierarchy) <= MAX_AGENTS]
+    drawings = {
+        view.title: picture(view.hierarchy, bodies=view.bodies, failing=view.failing)
+        for view in small[:MAX_HIERARCHIES]
+    }
+    remark = ""
+    if len(drawings) < len(views):
+        remark = f"{len(drawings)} of {len(views)} hierarchies are shown."
+    if large := [view.text for view in views if len(view.hierarchy) > MAX_AGENTS]:
+        remark += f" Too large for a picture (more than {MAX_AGENTS} agents): {'; '.join(large)}."
+    return pictures(drawings, "hierarchy"), remark

@@ -1,5 +1,6 @@
 """Sentences of a report: the verdict, one line for each condition, and the methods paragraph."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any
@@ -9,12 +10,15 @@ from ..presentation.tables import SummaryTable
 from ..results.analysis import Analysis
 from ..results.notation import format_estimate
 from ..results.permutation_tests import LEVEL
+from ..results.statistics import Estimate, exactly
 from ..spec.outline import StudyOutline
 
 SIZES = {"robots": "robot", "carts": "cart", "joints": "joint"}
 """Keys of scenarios that give the number of bodies, and the name of one."""
 MAX_CONDITIONS = 12
 """Maximum number of conditions that are described in a sentence each."""
+MAX_TIED = 3
+"""Maximum number of conditions of equal value that are named."""
 
 
 def main_title(table: SummaryTable) -> str:
@@ -32,17 +36,30 @@ def verdict(table: SummaryTable, title: str, analysis: Analysis) -> tuple[str, .
     lines = [line for line in table.lines if title in line.estimates]
     if not lines:
         return ()
-    lines.sort(key=lambda line: float(line.estimates[title].value))
-    values = [format_estimate(line.estimates[title]) for line in lines]
+    estimates = {line.condition: line.estimates[title] for line in lines}
+    values = [float(estimate.value) for estimate in estimates.values()]
     subject = title.capitalize()
     if len(lines) == 1:
-        return (f"{subject} is {values[0]}.",)
-    text = (
-        f"{subject} is highest with {lines[-1].condition}, {values[-1]}, and lowest with "
-        f"{lines[0].condition}, {values[0]}"
-    )
+        return (f"{subject} is {format_estimate(*estimates.values())}.",)
+    highest, lowest = (_holders(estimates, limit) for limit in (max(values), min(values)))
+    text = f"{subject} is highest with {highest}, and lowest with {lowest}"
+    if highest == lowest:
+        text = f"{subject} is the same with {highest}"
     compared = significant(analysis)
     return (f"{text}; {compared}." if compared else f"{text}.",)
+
+
+def _holders(estimates: Mapping[str, Estimate], value: float) -> str:
+    """Return the conditions that have a value, and the value, as text.
+
+    The value has its interval if that is the same for all of them.
+    """
+    tied = {c: e for c, e in estimates.items() if math.isclose(e.value, value, abs_tol=1e-12)}
+    names = [*tied][:MAX_TIED]
+    names += [f"{len(tied) - MAX_TIED} more"] * (len(tied) > MAX_TIED)
+    shown = {format_estimate(estimate) for estimate in tied.values()}
+    text = shown.pop() if len(shown) == 1 else format_estimate(exactly(value))
+    return f"{' and '.join(names)}, {text}"
 
 
 def significant(analysis: Analysis) -> str:

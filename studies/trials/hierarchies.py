@@ -8,15 +8,8 @@ from ..errors import refused
 from ..spec.spec import Spec
 
 
-def hierarchies_of(spec: Spec, limit: int | None = None) -> list[HierarchyView]:
+def hierarchies_of(spec: Spec) -> list[HierarchyView]:
     """Return the distinct hierarchies of a spec, each labeled by its first condition.
-
-    Parameters
-    ----------
-    spec
-        The spec.
-    limit
-        Number of hierarchies after which no further one is built; None: all are.
 
     Raises
     ------
@@ -30,8 +23,6 @@ def hierarchies_of(spec: Spec, limit: int | None = None) -> list[HierarchyView]:
         world = settings.scenario.model_dump_json(), settings.agents, settings.topology
         if world in worlds:
             continue
-        if len(views) == limit:
-            break
         worlds.add(world)
         with refused(after=f" (condition {label!r})"):
             scenario, hierarchy = settings.arrange(settings.scenario.build())

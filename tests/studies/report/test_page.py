@@ -12,7 +12,7 @@ from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.page import page, unfolded
 from nested_agents.studies.report.sentences import main_title, verdict
 from nested_agents.studies.results.analysis import Analysis, Summary
-from nested_agents.studies.results.statistics import exactly
+from nested_agents.studies.results.statistics import Estimate, exactly
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.trials.trial import trials_of
@@ -56,7 +56,7 @@ def test_methods_and_each_condition_are_described(html):
     assert html.count("<li>default: evaluation success is ") == 1
     assert html.count("<li>frozen: evaluation success is ") == 1
     lead = html[html.index('<p class="lead">') :].partition("</p>")[0]
-    assert "Evaluation success is highest with " in lead
+    assert "Evaluation success is the same with default and frozen, " in lead
     assert "Karigiannis" in html
 
 
@@ -83,6 +83,22 @@ def test_the_lowest_and_the_highest_success_are_a_sentence():
     assert verdict(table, "success", nothing) == (sentence,)
     assert verdict(tabulate(lines[:1]), "success", nothing) == ("Success is 0.90.",)
     assert verdict(table, "", nothing) == ()
+
+
+def test_conditions_of_equal_value_are_named_together():
+    def sentence(*values):
+        lines = [Summary(f"c{i}", 8, {"success": Estimate(*v)}) for i, v in enumerate(values)]
+        return verdict(tabulate(lines), "success", Analysis(()))[0]
+
+    whole, wide, none = (1.0, 0.7, 1.0), (1.0, 0.5, 1.0), (0.0, 0.0, 0.3)
+    lowest = "lowest with c0, 0 [0, 0.30]"
+    assert sentence(none, whole, whole) == (
+        f"Success is highest with c1 and c2, 1.00 [0.70, 1.00], and {lowest}."
+    )
+    two = sentence(none, whole, wide)
+    assert two == f"Success is highest with c1 and c2, 1, and {lowest}.", "intervals differ"
+    assert "c1 and c2 and c3 and 2 more, 1.00" in sentence(none, *[whole] * 5)
+    assert "highest" not in sentence(whole, whole)
 
 
 def test_equal_results_give_equal_bytes_wherever_they_are(finished, html, tmp_path):
@@ -196,6 +212,16 @@ def test_a_study_of_team_sizes_has_a_section_on_scalability(kept, tmp_path):
     assert section.count("<svg viewBox") >= 4, "four panels"
     assert '<pre id="scalability-csv" hidden>condition,seeds,evaluation success' in section
     assert len(re.findall(r'\bid="', html)) == len(set(re.findall(r'\bid="([^"]*)"', html)))
+
+
+def test_hierarchies_without_a_picture_are_counted(kept, tmp_path):
+    sweep = {"scenario.robots": [2, 3, 64], "topology": ["chain", "star"]}
+    html = page(kept(tmp_path, Spec.of({**SIZES, "sweep": sweep}), done=0))
+    section = html[html.index('<section id="hierarchy">') :].partition("</section>")[0]
+    assert len(re.findall('aria-label="hierarchy: ', section)) == 4
+    assert "4 of 6 hierarchies are shown." in section
+    assert "more than 64 agents): robots=64, topology=chain; robots=64, topology=star." in section
+    assert "exhaustive" in section, "the searches of the table try fewer joint actions"
 
 
 def test_a_study_of_one_team_size_has_none(html):

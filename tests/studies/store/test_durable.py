@@ -106,7 +106,7 @@ def test_a_recording_that_is_no_file_is_damaged_and_never_waited_for(
     make, study, capsys, monkeypatch
 ):
     monkeypatch.setattr(learning_curve, "draw", lambda analysis: {})
-    monkeypatch.setattr(page, "hierarchy_pictures", lambda store: [])
+    monkeypatch.setattr(page, "hierarchy_pictures", lambda store: ([], ""))
     for recording in (study / "recordings").glob("*.npz"):
         make(recording)
     with Store.open(study) as store:

@@ -344,7 +344,7 @@ def test_a_study_of_a_newer_version_is_refused(study, capsys):
 
 def test_a_study_of_an_older_version_is_read_and_not_continued(study, capsys, monkeypatch):
     monkeypatch.setattr(learning_curve, "draw", lambda analysis: {})
-    monkeypatch.setattr(page, "hierarchy_pictures", lambda store: [])
+    monkeypatch.setattr(page, "hierarchy_pictures", lambda store: ([], ""))
     expected = {}
     commands = ("table", "compare", "results --format csv", "report", "status")
     commands += ("export --overwrite",)
