@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..laws.universal import Scaling
-    from ..scalability.prediction import PredictionCheck
+    from ..scalability.prediction import PredictionCheck, Predictions
     from ..scalability.report import ScalabilityReport
 
 Place = str | PathLike[str]
@@ -283,8 +283,8 @@ class StudyData:
         measure: str | None = None,
         *,
         size: str | None = None,
-    ) -> tuple[str, ...]:
-        """Write predictions for team sizes that were not run to a file; return remarks.
+    ) -> Predictions:
+        """Predict team sizes that were not run, and write the predictions to a file.
 
         Parameters
         ----------
@@ -302,7 +302,7 @@ class StudyData:
         SpecError
             If a size was run, nothing can be predicted, or the file exists; one line.
         """
-        from ..scalability.prediction import predict
+        from ..scalability.prediction import Predictions, predict
         from .search_methods import method_remarks
 
         if Path(path).exists():
@@ -314,7 +314,8 @@ class StudyData:
         count = f"{path}: {len(file.predictions)} predictions, sha256 {file.digest}"
         with self._sources.active():
             methods = method_remarks(self.condition_settings(), results, size, sizes)
-        return (count, *remarks, *methods)
+        lines = chain.from_iterable(map(wrapped, (count, *remarks, *methods)))
+        return Predictions(file, tuple(lines))
 
     def check_prediction(self, path: Place) -> PredictionCheck:
         """Compare the predictions of a file with these results.

@@ -97,9 +97,10 @@ def _digits(value: float) -> str:
     return f"{value:.4g}".replace("e+", "e")
 
 
-def _quadratic_formula(p: Array) -> str:
-    c = math.exp(p[1]) - 1.0
-    return f"{_digits(math.exp(p[0]))} n (n {'-' if c < 0.0 else '+'} {_digits(abs(c))})"
+def _plus(log_excess: float) -> str:
+    """Return c with its sign, given ``log(1 + c)``."""
+    c = math.exp(log_excess) - 1.0
+    return f"{'-' if c < 0.0 else '+'} {_digits(abs(c))}"
 
 
 def _break_formula(p: Array) -> str:
@@ -124,7 +125,16 @@ QUADRATIC = Curve(
     slopes=_quadratic_slopes,
     begins=lambda x, y: [np.array([float((y - 2.0 * x).mean()), start]) for start in (0.0, 3.0)],
     exponents=lambda p: {"c of n (n + c)": float(np.exp(p[1]) - 1.0)},
-    formula=_quadratic_formula,
+    formula=lambda p: f"{_digits(math.exp(p[0]))} n (n {_plus(p[1])})",
+)
+LINEAR = Curve(
+    name="linear",
+    n_parameters=2,
+    of=lambda p, x: _quadratic(p, x) - x,
+    slopes=_quadratic_slopes,
+    begins=lambda x, y: QUADRATIC.begins(x, x + y),
+    exponents=lambda p: {"c of n + c": float(np.exp(p[1]) - 1.0)},
+    formula=lambda p: f"{_digits(math.exp(p[0]))} (n {_plus(p[1])})",
 )
 FLOOR = Curve(
     name="power law with a floor",

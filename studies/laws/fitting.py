@@ -6,7 +6,8 @@ logarithm of a positive mean, or the log odds of a rate.
 - ``power law``, for rates ``logistic in log n``: ``a + b x``; means, or odds, grow as ``n^b``;
 - ``linear to quadratic``: ``log(a n (n + c))``, c above -1, as pairs of agents grow at c = -1;
 - ``power law with a floor``: ``log(exp(c) + exp(a + b x))``;
-- ``break point``: ``a + b x + d max(0, x - k)``; the exponent is b, beyond ``n = exp(k)`` b + d.
+- ``break point``: ``a + b x + d max(0, x - k)``; the exponent is b, beyond ``n = exp(k)`` b + d;
+- ``linear``: ``log(a (n + c))``, c above -1, for counts such as the messages of a star, ``n - 1``.
 
 Seeds are the unit of sampling, and all sizes of a seed are resampled together. The values of seeds
 are linearized at their mean (delta method), so that the mean of the linearized values is exactly
@@ -32,10 +33,10 @@ import numpy as np
 from ...core.numerics import BoolArray, optimize, pd, special
 from ..results.permutation_tests import paired_permutation
 from ..results.statistics import Array, Estimate
-from .curves import POWER, Curve
+from .curves import LINEAR, POWER, QUADRATIC, Curve
 from .drift import Mixture, drift
-from .inference import mean_interval, student_quantile
-from .samples import LOGIT, Sample, check_sizes
+from .inference import student_quantile
+from .samples import FLAT, LOG, LOGIT, Sample, check_sizes
 
 RESAMPLES = 400
 """Resamples of seeds, which estimate a standard error to 4%."""
@@ -45,8 +46,8 @@ MARGIN = 1.0
 """Difference of the log densities of held-out sizes that a law of more parameters needs."""
 FEWEST = 3
 """Minimum number of sizes of a law."""
-FLAT = 1e-9
-"""Variance of seeds that counts as rounding."""
+NEAR = 1e-6
+"""Deviation, relative to a value, up to which a law passes through it."""
 MOST_FREEDOM = 1e6
 """Degrees of freedom of an almost normal distribution."""
 MAX_LOG_DEVIATION = 30.0
@@ -79,6 +80,11 @@ class Law(NamedTuple):
     def seeds(self) -> int:
         """Number of seeds."""
         return len(self.sample.values)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether all seeds agree, and the law passes through all values."""
+        return self.sample.is_flat and bool(np.abs(self.left).max() <= NEAR)
 
     @property
     def formula(self) -> str:
@@ -237,6 +243,8 @@ def choose(sample: Sample) -> Law:
             f"{m} size{'s' * (m != 1)} and {n_seeds} seed{'s' * (n_seeds != 1)}: a law takes "
             f"{FEWEST} sizes and 2 seeds or more"
         )
+    if (exact := _exact(sample)) is not None:
+        return exact
     laws = [c for c in sample.scale.curves if c.n_parameters < m]
     chosen = laws[0]
     checks = _held_out(chosen, sample)
@@ -247,6 +255,18 @@ def choose(sample: Sample) -> Law:
         if len(others) == len(checks) > 0 and density > score + MARGIN:
             chosen, checks, score = curve, others, density
     return fit(chosen, sample)._replace(held_out=tuple(check for _, check in checks))
+
+
+def _exact(sample: Sample) -> Law | None:
+    """Return a law that passes through all values of seeds that agree; None if none does.
+
+    Such values are counts of a hierarchy, such as its messages.
+    """
+    for curve in (POWER, QUADRATIC, LINEAR) if sample.scale is LOG and sample.is_flat else ():
+        law = fit(curve, sample, FEW_RESAMPLES)
+        if law.is_exact:
+            return law
+    return None
 
 
 def _held_out(curve: Curve, sample: Sample) -> list[tuple[float, tuple[float, float, Estimate]]]:
@@ -267,10 +287,10 @@ def _held_out(curve: Curve, sample: Sample) -> list[tuple[float, tuple[float, fl
     return checks
 
 
-def compare(law: Law, base: Law) -> tuple[Estimate, float]:
-    """Return the difference of the exponents of two power laws of the same seeds and sizes, and p.
+def compare(law: Law, base: Law) -> tuple[Array, float]:
+    """Return the differences of the exponents of two power laws by seed, and p.
 
-    p, for no difference, is that of all permutations of signs over seeds.
+    Seeds and sizes are the same. p, for no difference, is that of all permutations of signs.
     """
     first, second = (
         np.polyfit(np.log(own.sizes), own.values.T, 1, w=np.sqrt(own.weights))[0]
@@ -278,4 +298,4 @@ def compare(law: Law, base: Law) -> tuple[Estimate, float]:
     )
     is_equal = np.abs(first - second).max() <= FLAT  # the signs of rounding say nothing
     p = 1.0 if is_equal else paired_permutation(first, second)
-    return mean_interval(first - second), p
+    return first - second, p

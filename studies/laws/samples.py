@@ -12,6 +12,8 @@ from ...core.numerics import BoolArray, special
 from ..results.statistics import Array
 from .curves import BREAK, FLOOR, LOGISTIC, POWER, QUADRATIC, Curve
 
+FLAT = 1e-9
+"""Variance of seeds that counts as rounding."""
 MIN_SIZE = 1.0
 """Minimum size."""
 
@@ -77,6 +79,11 @@ class Sample(NamedTuple):
             censored=self.censored[:, :m],
             weights=self.weights[:m],
         )
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether all seeds agree at every size."""
+        return float(self.values.var(axis=0).max()) <= FLAT
 
     @property
     def means(self) -> Array:

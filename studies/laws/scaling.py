@@ -15,10 +15,14 @@ from ..results.differences import BySeed
 from ..results.measured import title_of, values_of
 from ..results.notation import format_estimate, format_number, format_p, wrapped
 from ..results.permutation_tests import LEVEL, holm
+from ..results.power import deviation_of
+from ..results.power_text import power_text
 from ..results.results import Results
 from ..results.statistics import Array
 from . import fitting
+from .curves import POWER
 from .fitting import Law
+from .inference import mean_interval
 from .samples import GEOMETRIC, Sample, of_numbers, of_rates, of_times
 from .size_axis import SizeAxis, check_size
 
@@ -102,19 +106,20 @@ class ScalingLaw(NamedTuple):
         alike = {g: self.laws[g] for g in others if base and _are_alike(self.laws[g], base)}
         if base is None or not alike:
             return []
-        lines = [f"Exponents, minus that of {first}:"]
+        lines = [f"Exponents of power laws, minus that of {first}:"]
         compared = [fitting.compare(law, base) for law in alike.values()]
         adjusted = holm([p for _, p in compared]).tolist()
-        for group, (difference, _), p in zip(alike, compared, adjusted, strict=True):
+        for group, (by_seed, _), p in zip(alike, compared, adjusted, strict=True):
             word = "differs" if p < LEVEL else "no significant difference"
-            text = f"{word}: {group}, {format_estimate(difference)}, p {format_p(p)}"
+            text = f"{word}: {group}, {format_estimate(mean_interval(by_seed))}, p {format_p(p)}"
             lines += wrapped(text, "  ")
-        return lines
+        deviation = deviation_of([by_seed for by_seed, _ in compared], of_rates=False)
+        return lines + power_text(base.seeds, len(compared), deviation, None, "exponents")
 
 
 def _are_alike(*laws: Law) -> bool:
     """Return whether the exponents of laws can be compared seed by seed."""
-    are_lines = all(law.curve.n_parameters == 2 and not law.sample.censored.any() for law in laws)
+    are_lines = all(law.curve.of is POWER.of and not law.sample.censored.any() for law in laws)
     own, base = (law.sample for law in laws)
     same_shape = own.values.shape == base.values.shape
     return are_lines and same_shape and bool((own.sizes == base.sizes).all())
@@ -132,7 +137,9 @@ def _sentence(law: Law, size: str) -> str:
         inside = "inside" if e.low <= measured <= e.high else "outside"
         text += f"; {n:g} left out: predicted {format_estimate(e)}, "
         text += f"measured {format_number(measured)}, {inside}"
-    if law.sample.values.var(axis=0).max() <= fitting.FLAT:
+    if law.is_exact:
+        text += "; all seeds agree, and the law passes through all values"
+    elif law.sample.is_flat:
         text += "; all seeds agree, so that intervals of parameters do not show how well it fits"
     return f"{text}."
 

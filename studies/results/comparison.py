@@ -26,7 +26,7 @@ from .differences import (
 from .measured import default_measure, title_of, values_by_seed, values_of
 from .notation import listed, wrapped
 from .power_text import power_lines
-from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME
+from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME, within
 from .results import STEPS, Results, row_means
 from .statistics import Array, Estimate, exactly
 
@@ -181,7 +181,8 @@ def _group(
     for name, condition in members.items():
         title = ", ".join(filter(None, (setting, name)))
         own = values[condition]
-        estimates = {title_of(measure, phase): mean_estimate(measure, own)}
+        shown = within(results, condition, measure)
+        estimates = {title_of(measure, phase): mean_estimate(shown, own)}
         if name in by_name:
             estimates |= _difference_columns(by_name[name], measure)
             count = _left_out(results, own, values[members[reference]], paired=by_name[name].paired)

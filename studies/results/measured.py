@@ -89,7 +89,7 @@ def values_by_seed(
     measures = {m.name: m for m in (*results.measures, STEPS, RETURN)} if results.phases else {}
     titles = {m.heading: m.name for m in reversed([*measures.values()])}
     titles |= {title: m.name for m in recovery.values() for title in (m.heading, m.title)}
-    name = titles.get(name, name)
+    name = name if name in measures else titles.get(name, name)
     if name in RECOVERY and not recovery:
         raise SpecError(
             f"measure = {name!r}: needs episodes and a failure (onset) in training; the two tables "
@@ -115,7 +115,7 @@ def values_by_seed(
             )
         return measure, known, phase
     present = {*results.episodes.dropna(axis=1, how="all")}.intersection(measures)
-    return _trial_numbers(results, name, present | {*recovery})
+    return trial_numbers(results, name, present | {*recovery})
 
 
 def _until_success(
@@ -146,10 +146,14 @@ def _until_success(
     return replace(steps, title="steps to success", better="lower"), values
 
 
-def _trial_numbers(
-    results: Results, name: str, others: Collection[str]
+def trial_numbers(
+    results: Results, name: str, others: Collection[str] = ()
 ) -> tuple[Measure, dict[str, pd.DataFrame], str]:
-    """Return a number of whole trials as `values_by_seed` does; `others` are further measures."""
+    """Return a number of whole trials as `values_by_seed` does.
+
+    `others` are further measures, which a message names. A measure of episodes may have the same
+    name as the number.
+    """
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
     names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}

@@ -144,6 +144,15 @@ def bounded(name: str, courses: Iterable[FailureCourse], longest: int | None) ->
     return RECOVERY[name]
 
 
+def within(results: Results, condition: str, measure: Measure) -> Measure:
+    """Return a measure with the range that it has for a condition, which is that of its failure."""
+    if measure.name not in RECOVERY:
+        return measure
+    course = failure_course(results, condition)
+    own = bounded(measure.name, [course], results.step_limits[0])
+    return replace(own, title=measure.title)
+
+
 def recovery_by_seed(
     results: Results, name: str, phase: str
 ) -> tuple[Measure, Mapping[str, pd.Series]]:

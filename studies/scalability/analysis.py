@@ -186,12 +186,13 @@ class Scalability:
         for place, names in places.items():
             yield f"For {_join(names)}, {place}."
         likely = [
-            f"{best:g} for {name} (probability {format_number(probability)})"
+            f"{with_name(best, size)} for {name} (probability {format_number(probability)})"
             for name, (best, probability) in self._of_named(self.best_sizes)
             if probability > LIKELY
         ]
         if likely:
-            yield f"Performance is best with this number of {size}: {_join(likely)}."
+            title = self.data.performance_title
+            yield f"{title[0].upper()}{title[1:]} is best with {_join(likely)}."
 
     def _of_named(self, items: Mapping[str, T]) -> list[tuple[str, T]]:
         return [(name, item) for name, item in items.items() if name in self.named]
@@ -277,8 +278,8 @@ def place_of_maximum(law: UniversalLaw, largest: float, size: str) -> str:
         )
     if math.isinf(high):
         return (
-            f"the throughput is at its maximum with {with_name(math.floor(low), size)} or more; "
-            "these seeds give no upper bound"
+            f"the throughput is greatest with at least {with_name(math.floor(low), size)}; the "
+            "seeds do not say with how many"
         )
     return f"the throughput is at its maximum with {format_estimate(law.best_size)} {size}"
 

@@ -18,7 +18,7 @@ from ..laws.size_axis import SizeAxis
 from ..laws.universal import Scaling
 from ..results.analysis import estimate_of, mean_estimate
 from ..results.differences import BySeed
-from ..results.measured import title_of, values_of
+from ..results.measured import title_of, trial_numbers, values_of
 from ..results.results import Results
 from ..results.statistics import Array, Estimate
 
@@ -164,7 +164,8 @@ def collect(
     costs = {}
     for cost, number in NUMBERS.items():
         with suppress(SpecError):  # was not measured
-            costs[cost] = _cells(values_of(results, number)[1], places)
+            _, frames, _ = trial_numbers(results, number)
+            costs[cost] = _cells({c: own.iloc[:, 0] for c, own in frames.items()}, places)
     times: Cells = {}
     with suppress(SpecError):  # was not measured
         times = _cells(_times(results, phase), places)

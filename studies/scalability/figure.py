@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,6 +17,8 @@ from .data import HEADINGS, Place
 
 LAW_POINTS = 60
 """Points of the line of a law."""
+LAW: dict[str, Any] = {"color": "#444444", "lw": 0.8, "alpha": 0.6}
+"""Look of the line of a law, which has the color of its hierarchy."""
 MAX_EFFICIENCY = 1.2
 """Efficiency that its axis always shows."""
 
@@ -47,7 +50,10 @@ def draw(report: Scalability) -> Figure:
             figures.scale_axis(axes, [round(n) for n in data.all_sizes])
         for axes in panels.flat:
             axes.grid(alpha=0.25)
-        figures.name_lines(figure, list(data.hierarchies), "means over seeds, bars: 95% intervals")
+        has_law = any(law.is_plausible for law in report.universal_laws.values())
+        others = [figures.handle("universal scalability law", **LAW)] if has_law else []
+        title = "means over seeds, bars: 95% intervals"
+        figures.name_lines(figure, list(data.hierarchies), title, others)
     return figure
 
 
@@ -89,7 +95,7 @@ def _draw_law(axes: Axes, report: Scalability, name: str) -> None:
     measured = float(times.iloc[:, 0].mean())
     efficiency = law.throughput(factors) / factors * measured / law.time_at_smallest
     color = figures.look(report.data.hierarchies.index(name))["color"]
-    axes.plot(times.columns[0] * factors, efficiency, color=color, lw=0.8, alpha=0.6)
+    axes.plot(times.columns[0] * factors, efficiency, **{**LAW, "color": color})
 
 
 def _draw_front(axes: Axes, report: Scalability, cost: str) -> None:
@@ -101,10 +107,12 @@ def _draw_front(axes: Axes, report: Scalability, cost: str) -> None:
     for name in data.at_size(largest):
         if (name, largest) in report.cost_estimates[cost]:
             color = figures.look(data.hierarchies.index(name))["color"]
-            x = report.cost_estimates[cost][name, largest].value
-            y = data.performance_estimates[name, largest].value
+            x = report.cost_estimates[cost][name, largest]
+            y = data.performance_estimates[name, largest]
             face = "white" if is_beaten.get(name) else color
-            axes.plot(x, y, "o", color=color, markerfacecolor=face, ms=7)
+            axes.plot([x.low, x.high], [y.value, y.value], color=color, lw=1.0)
+            axes.plot([x.value, x.value], [y.low, y.high], color=color, lw=1.0)
+            axes.plot(x.value, y.value, "o", color=color, markerfacecolor=face, ms=7)
     axes.set_xlabel(f"{HEADINGS[cost]}, {largest:g} {data.size}")
     axes.set_ylabel(data.performance_title)
     figures.log_axis(axes, "x")

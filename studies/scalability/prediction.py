@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from ...core.numerics import pd
 from ..errors import SpecError
 from ..laws.scaling import scaling_law
 from ..laws.size_axis import SizeAxis, check_size, columns_of
@@ -23,7 +22,7 @@ from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary, mean_estimate
 from ..results.json_files import CHECKSUM, checksum
-from ..results.measured import values_of
+from ..results.measured import values_by_seed
 from ..results.notation import format_estimate, format_number
 from ..results.results import Results
 from ..results.statistics import Estimate
@@ -33,6 +32,8 @@ from .data import ALL_TEAMS, HEADINGS, NUMBERS, TIME
 
 LEVEL = 0.9
 """Coverage of the intervals, for the mean of as many seeds as were fitted."""
+PREDICTED = f"predicted ({LEVEL:.0%})"
+"""Heading of predicted means."""
 FREE_KEYS = ("seeds", "title", "keep_teams")
 """Keys besides the size in which the spec of later results may differ."""
 
@@ -164,6 +165,21 @@ def predict(
 
 
 @dataclass(frozen=True, repr=False)
+class Predictions(Report):
+    """Predictions that were written to a file."""
+
+    file: PredictionFile
+    notes: tuple[str, ...] = ()
+
+    @property
+    def table(self) -> SummaryTable:
+        """The predicted means."""
+        seeds = self.file.seeds
+        own = self.file.predictions
+        return tabulate([Summary(p.name, seeds, {PREDICTED: p.estimate}) for p in own])
+
+
+@dataclass(frozen=True, repr=False)
 class PredictionCheck(Report):
     """Predictions compared with later results."""
 
@@ -174,10 +190,9 @@ class PredictionCheck(Report):
     @property
     def table(self) -> SummaryTable:
         """Predicted and measured means."""
-        heading = f"predicted ({LEVEL:.0%})"
         return tabulate(
             [
-                Summary(own.name, seeds, {heading: own.estimate, "measured": measured})
+                Summary(own.name, seeds, {PREDICTED: own.estimate, "measured": measured})
                 for own, seeds, measured in self.checked
             ]
         )
@@ -228,13 +243,15 @@ def check(file: PredictionFile, results: Results, spec: SpecTable) -> Prediction
         (group or ALL_TEAMS, n): condition
         for condition, (group, n) in SizeAxis.by(file.size, swept).places.items()
     }
-    measured = {name: values_of(results, name) for name in {p.measure for p in file.predictions}}
+    measured = {
+        name: values_by_seed(results, name) for name in {p.measure for p in file.predictions}
+    }
     checked: list[tuple[SizePrediction, int, Estimate]] = []
     for prediction in file.predictions:
         measure, values, _ = measured[prediction.measure]
         condition = condition_at.get((prediction.hierarchy, prediction.size))
         if condition in values:
-            own = pd.DataFrame(values[condition])
+            own = values[condition]
             checked.append((prediction, len(own), mean_estimate(measure, own)))
     if not checked:
         predicted = ", ".join(f"{n:g}" for n in sorted({p.size for p in file.predictions}))

@@ -26,7 +26,7 @@ from ...core.plugins.trust import modules_in
 from ...core.plugins.words import closest, expect
 from ...topologies.names import join_names
 from ..errors import SpecError, refused
-from ..store.database import DATABASE, SPEC_FILE
+from ..store.database import DATABASE, EVALUATION, SAMPLED, SPEC_FILE
 from .conditions import Condition, Curriculum, Length, Name, Override
 from .controls import LEARN_NOTHING, planning_remark, tuning_keys
 from .objects import plain
@@ -127,6 +127,16 @@ class Spec(Settings):
         elif value not in known:
             moved = STUDIES.moved.get(value) if is_study else None
             raise ValueError(moved or closest(value, known))
+        return value
+
+    @field_validator("evaluations")
+    @classmethod
+    def _not_taken(cls, value: Mapping[str, SpecTable]) -> Mapping[str, SpecTable]:
+        taken = SAMPLED.removeprefix(EVALUATION)
+        if taken in value:
+            raise ValueError(
+                f"{taken!r} is the evaluation of stochastic policies, use another name"
+            )
         return value
 
     @field_validator("seeds", mode="before", json_schema_input_type=int | tuple[Seed, ...])

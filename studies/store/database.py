@@ -42,6 +42,8 @@ STAGE = "training:"
 """Prefix of the phase of a curriculum's stage, before the name of the stage."""
 EVALUATION = "evaluation:"
 """Prefix of the phase of a further evaluation, before its name."""
+SAMPLED = f"{EVALUATION}sampled actions"
+"""Phase of the evaluation with sampled instead of most probable actions."""
 
 BEFORE = ("phase", "episode", "steps")
 """Columns of an episode before its measures."""

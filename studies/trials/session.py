@@ -21,7 +21,7 @@ from ...core.interface.stacked import make_environments
 from ...core.numerics import working_seconds
 from ...core.plugins.words import expect
 from ..spec.controls import LEARN_NOTHING
-from ..store.database import EVALUATION, STAGE
+from ..store.database import EVALUATION, SAMPLED, STAGE
 from ..store.durable import TEAM, Recording
 from .arrangement import Arrangement, arrange, teach, transfer
 from .checkpoints import Checkpoint
@@ -33,9 +33,6 @@ EVALUATION_WORLDS = 10**6
 
 CURRICULUM_WORLDS = 2 * 10**6
 """Number of the first episode of a curriculum."""
-
-SAMPLED = f"{EVALUATION}sampled actions"
-"""Phase of the evaluation with sampled instead of most probable actions."""
 
 RECORDED = "recordings:"
 """Prefix of the groups of arrays in a checkpoint that hold recordings."""

@@ -27,8 +27,8 @@ from ...results.analysis import (
 from ...results.results import CPU, Results
 from ...results.statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, stack_estimates
 from ...spec.spec import Spec
-from ...store.database import EVALUATION
-from ...trials.session import SAMPLED, Session
+from ...store.database import EVALUATION, SAMPLED
+from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from ...results.notation import wrapped
 from .. import options
 from ..display import Form, in_form, print_data, print_lines, print_table, print_text, save_plot
 from ..loading import read_results, say_remarks
@@ -98,8 +97,9 @@ def scalability(
     if predict:
         if out is None:
             raise click.UsageError("--predict: needs --out FILE.json")
-        written, *remarks = loaded.predict_sizes(predict, out, measure, size=choices["size"])
-        print_text(written, *(line for remark in remarks for line in wrapped(remark)))
+        predicted = loaded.predict_sizes(predict, out, measure, size=choices["size"])
+        print_table(predicted.table, ())
+        print_text(*predicted.notes)
         return 0
     report = loaded.scalability(measure, **choices)
     if plot is not None:

@@ -123,6 +123,16 @@ def test_mean_recovery_times_are_said_to_be_lower_bounds() -> None:
     assert said == {"study", "recovery_time", "recovery_decisions"}
 
 
+def test_each_condition_has_the_range_of_its_own_failure() -> None:
+    """A condition that fails late cannot need more episodes than it has left."""
+    made = wheel_failure(ENDS)
+    late = "4 wheels, seized, enabled=true"
+    made.numbers[late]["onset"] = made.numbers[late]["onset"] + 10
+    lines = compare_conditions(made.frames(), "recovery_time").table
+    highest = {line.condition: line.estimates["recovery time [episodes]"].high for line in lines}
+    assert highest[late] <= 10 < max(highest.values())
+
+
 def test_recovery_is_no_measure_where_nothing_fails() -> None:
     results = ablation({"a": 0.5, "b": 0.5}).frames()
     with pytest.raises(SpecError, match="measure = 'recovered'"):

@@ -170,9 +170,28 @@ def test_exponents_are_compared_seed_by_seed() -> None:
         curves.POWER, samples.of_numbers(SIZES, np.exp(common + 0.2 * np.log(SIZES)))
     )
     difference, p = fitting.compare(one, other)
-    assert float(difference.value) == pytest.approx(0.3)
+    assert difference.mean() == pytest.approx(0.3)
     assert p == pytest.approx(2 / 2**8)  # the least of eight seeds
     assert fitting.compare(one, one)[1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("count", "sizes"),
+    [
+        (lambda n: n - 1, [2, 3, 4, 6]),
+        (lambda n: n * (n - 1) / 2, [2, 4, 8]),
+        (lambda n: 4 * n, [2, 4, 8]),
+        (lambda n: 2 * n + 6, [2, 3, 5]),
+    ],
+)
+def test_counts_of_a_hierarchy_have_the_law_that_passes_through_them(count, sizes) -> None:
+    """As messages of a star, n - 1, of which every power law is wrong elsewhere."""
+    sizes = np.array(sizes, dtype=float)
+    law = fitting.choose(samples.of_numbers(sizes, np.tile(count(sizes), (5, 1))))
+    predicted = law.predict(64)
+    assert float(predicted.value) == pytest.approx(count(64), rel=1e-4)
+    assert float(predicted.low) == pytest.approx(count(64), rel=0.1)
+    assert float(predicted.high) == pytest.approx(count(64), rel=0.1)
 
 
 @pytest.mark.parametrize(

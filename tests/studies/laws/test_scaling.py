@@ -43,7 +43,9 @@ def test_decisions_to_a_criterion_are_counted_and_fitted() -> None:
     assert chain is not None
     # Seeds 0 and 1 of two robots begin after 1 and 2 episodes; five more are looked at.
     assert np.exp(chain.sample.values[:2, 0]) == pytest.approx([20 * 6, 20 * 7])
-    assert any(line.startswith("Exponents, minus that of chain") for line in law.notes)
+    assert any(
+        line.startswith("Exponents of power laws, minus that of chain") for line in law.notes
+    )
 
 
 def test_runs_that_never_reach_it_are_censored() -> None:
@@ -158,8 +160,16 @@ def test_equal_values_are_no_law() -> None:
 
 
 def test_seeds_that_agree_do_not_make_a_law_certain() -> None:
-    law = scaling_law(made_up(ALWAYS), "steps")
-    assert "all seeds agree, so that intervals" in " ".join(" ".join(law.notes).split())
+    exact = made_up(ALWAYS)
+    no_law = replace(exact, episodes=exact.episodes.replace({"steps": {40: 70}}))
+    for results, said in (
+        (exact, "the law passes through all values"),
+        (no_law, "so that intervals of parameters do not show how well it fits"),
+    ):
+        law = scaling_law(results, "steps")
+        assert f"all seeds agree, {'and ' * (results is exact)}{said}" in " ".join(
+            " ".join(law.notes).split()
+        )
 
 
 CARTS = {
@@ -224,11 +234,11 @@ def test_a_search_method_that_changes_is_remarked(tmp_path) -> None:
     few = {**spec, "sweep": {"scenario.carts": [1, 2, 3]}}
     study = na.run(few, tmp_path / "b", jobs=1, progress=False)
     assert na.scaling_law(study, predict=[4]).analysis.remarks == ()
-    predicted = [*na.scaling_law(study, predict=[12]).analysis.remarks]
-    predicted += study.predict_sizes([12, 10**6], tmp_path / "p.json", "final_distance_m")[-1:]
-    for remark in predicted:
-        assert "exact from 1 carts, best-response from 12 carts" in remark
-    assert len(predicted) == 2
+    remarks = na.scaling_law(study, predict=[12]).analysis.remarks
+    predicted = study.predict_sizes([12, 10**6], tmp_path / "p.json", "final_distance_m")
+    for lines in (remarks, predicted.notes):
+        said = " ".join(" ".join(lines).split())
+        assert "exact from 1 carts, best-response from 12 carts" in said
 
 
 def table(path, sizes, of, seeds=4):

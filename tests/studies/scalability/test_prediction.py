@@ -10,6 +10,7 @@ import nested_agents as na
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.scalability.prediction import PredictionFile, check, predict
 from nested_agents.studies.workers.runner import save
+from research import RESULTS
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +107,16 @@ def test_options_that_a_mode_does_not_use_are_refused(tables, tmp_path, capsys):
     assert main(["scalability", small, *columns, *predict, "--check", str(path)]) == 2
     assert main(["scalability", small, *columns, "--out", str(path)]) == 2
     assert "--out: is not used without --predict" in capsys.readouterr().err
+
+
+def test_what_was_measured_has_the_interval_of_the_table(tmp_path):
+    study = na.load(RESULTS / "scaling.json")
+    path = tmp_path / "prediction.json"
+    predicted = study.where("robots <= 8").predict_sizes([16], path)
+    assert predicted.table.lines[0].condition == "all teams, 16: evaluation success"
+    (own, *_) = study.check_prediction(path).checked
+    shown = study.table().lines[-1].estimates["evaluation success"]
+    assert tuple(own[2]) == tuple(shown)
 
 
 def test_a_prediction_replaces_no_file(tables):

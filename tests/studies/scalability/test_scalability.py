@@ -10,6 +10,7 @@ import pytest
 import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.results.comparison import compare_conditions
 from nested_agents.studies.results.results import from_arrays
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.scalability import analysis as analysis_module
@@ -63,6 +64,26 @@ def test_the_performance_is_that_of_the_table():
     assert tuple(own) == tuple(shown.estimates["evaluation success"])
     assert own.high == 1.0
     assert own.low < 1.0
+
+
+def test_costs_are_numbers_of_trials_whatever_measures_are_called():
+    """A scenario may call its own measures as the toolkit calls costs."""
+    sizes = (2, 4)
+    measures = (SUCCESS, na.Measure("messages", "total"), na.Measure("total", "total reward"))
+    training = {
+        str(n): {m.name: np.full((3, 2), 100.0 * n) for m in measures[1:]}
+        | {"success": np.ones((3, 2)), "steps": np.full((3, 2), 5)}
+        for n in sizes
+    }
+    numbers = {str(n): {"messages": np.full(3, n - 1.0), "total": np.full(3, 9.0)} for n in sizes}
+    columns = {str(n): {"scenario.robots": n} for n in sizes}
+    seeds = dict.fromkeys(columns, range(3))
+    results = from_arrays({"training": training}, seeds, numbers, {}, columns, measures)
+    costs = analyze(results, {}, None, None, None, None, "").data.costs
+    assert costs["messages"]["all teams", 4.0].tolist() == [3.0] * 3
+    assert costs["compute_s"]["all teams", 4.0].tolist() == [9.0] * 3
+    assert compare_conditions(results, "total").title == "training total reward"
+    assert compare_conditions(results, "messages").title == "training total"
 
 
 def test_controls_that_never_succeed_have_no_speed_up():
@@ -138,7 +159,7 @@ def test_numbers_of_whole_trials_leave_the_times_of_evaluation():
         ((20.0, 1.0, 30.0), "no best team size"),
         ((20.0, 1.2, 30.0), "more than 1 robot,"),
         ((20.0, 16.0, 30.0), "more than 16 robots"),
-        ((8.0, 2.5, np.inf), "2 robots or more"),
+        ((8.0, 2.5, np.inf), "at least 2 robots"),
         ((8.0, 6.0, 10.0), "at its maximum with 8 [6, 10] robots"),
     ],
 )
@@ -233,7 +254,8 @@ def test_the_figure_fills_the_points_on_the_front():
     points = analysis.fronts.itertuples()
     on_front = [p.on_front for p in points if (p.cost, p.size) == (cost, largest)]
     assert len({*on_front}) == 2
-    faces = [line.get_markerfacecolor() for line in draw(analysis).axes[3].lines]
+    points = [line for line in draw(analysis).axes[3].lines if line.get_marker() == "o"]
+    faces = [point.get_markerfacecolor() for point in points]
     assert [face != "white" for face in faces] == on_front
 
 

@@ -90,6 +90,7 @@ BAD = {
     "evaluations = 3": ["evaluations = 3", "table"],
     "evaluations.' ' = {}": ["evaluations", "can be printed"],
     "evaluations.a = 3": ["evaluations.a = 3", "table"],
+    "evaluations.'sampled actions' = {}": ["evaluations", "sampled actions", "another name"],
     "evaluations.a.boxx = 'circle'": ["scenario.boxx = 'circle'", "unknown", "evaluation 'a'"],
     "seeds =": ["not valid TOML"],
     "episodes = 1979-05-27": ["episodes = 1979-05-27"],
