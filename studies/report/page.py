@@ -4,7 +4,9 @@ import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import jinja2
 from markupsafe import Markup
@@ -67,15 +69,15 @@ def page(directory: Path) -> str:
         older = older_results(store)
         results_version = store.version
     with sources.active():
-        analysis = analyse_as(outline.study, results)
-        figures = dict(draw_figures(load_study(outline.study), analysis))
+        analyzed = analyse_as(outline.study, results)
+        figures = dict(draw_figures(load_study(outline.study), analyzed))
         scalability = _scalability(results, settings)
-    notes = _notes(results, analysis)
-    if older is not None:
-        notes = (older, *notes)
+    analysis = _judged(results, analyzed)
+    notes = analysis.notes if older is None else (older, *analysis.notes)
     there = {label: own for label, own in settings.items() if label in results.conditions}
     table = tabulate(analysis.table)
     rate = main_title(table)
+    differences = analysis.differences.values()
     return _template("page").render(
         study=outline.study,
         title=outline.table.get("title") or outline.study,
@@ -87,7 +89,7 @@ def page(directory: Path) -> str:
         significant=significant(analysis),
         leads=(*verdict(table, rate, analysis), *headlines(results, there)),
         sentences=condition_sentences(table, rate, analysis),
-        methods=methods(outline, settings, extent(outline), is_compared=bool(analysis.differences)),
+        methods=methods(settings, extent(outline), table, is_compared=any(differences)),
         notes=unfolded((*notes, *control_lines(there), *below_random(results, there))),
         table=table,
         pictures=pictures(dict(sorted(figures.items(), key=is_secondary))),
@@ -106,13 +108,15 @@ def page(directory: Path) -> str:
     )
 
 
-def _notes(results: Results, analysis: Analysis) -> tuple[str, ...]:
-    """Return the notes of a study, or those of a comparison if it has none of its own."""
-    notes = notes_of(analysis)
-    if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
-        by = key_beside_size(results)
-        notes = compare_conditions(results, results.main.name, by=by).notes  # with identity lines
-    return (*missing_reference(results), *notes)
+def _judged(results: Results, analysis: Any) -> Analysis:
+    """Return the analysis of a study, with a comparison of its conditions if it has no notes."""
+    if not isinstance(analysis, Analysis):
+        analysis = Analysis(tuple(analysis.table), notes_of(analysis))
+    if len(results.conditions) > 1 and [*analysis.notes] == identity_lines(results.identical):
+        compared = compare_conditions(results, results.main.name, by=key_beside_size(results))
+        differences = {compared.title: compared.differences}
+        analysis = replace(analysis, notes=compared.notes, differences=differences)
+    return replace(analysis, notes=(*missing_reference(results), *analysis.notes))
 
 
 def _scalability(results: Results, settings: Mapping[str, SpecTable]) -> ScalabilityReport | None:

@@ -5,20 +5,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
+from ...core.plugins.words import show
 from ..presentation.progress import count
 from ..presentation.tables import SummaryTable
 from ..results.analysis import Analysis
 from ..results.notation import format_estimate
 from ..results.permutation_tests import LEVEL
+from ..results.recovery import RECOVERED
 from ..results.statistics import Estimate, exactly
-from ..spec.outline import StudyOutline
 
 SIZES = {"robots": "robot", "carts": "cart", "joints": "joint"}
 """Keys of scenarios that give the number of bodies, and the name of one."""
 MAX_CONDITIONS = 12
 """Maximum number of conditions that are described in a sentence each."""
-MAX_TIED = 3
-"""Maximum number of conditions of equal value that are named."""
+MAX_NAMED = 3
+"""Maximum number of conditions that are named together."""
 
 
 def main_title(table: SummaryTable) -> str:
@@ -55,11 +56,19 @@ def _holders(estimates: Mapping[str, Estimate], value: float) -> str:
     The value has its interval if that is the same for all of them.
     """
     tied = {c: e for c, e in estimates.items() if math.isclose(e.value, value, abs_tol=1e-12)}
-    names = [*tied][:MAX_TIED]
-    names += [f"{len(tied) - MAX_TIED} more"] * (len(tied) > MAX_TIED)
     shown = {format_estimate(estimate) for estimate in tied.values()}
     text = shown.pop() if len(shown) == 1 else format_estimate(exactly(value))
-    return f"{' and '.join(names)}, {text}"
+    return f"{_joined([*tied])}, {text}"
+
+
+def _joined(names: Sequence[str]) -> str:
+    """Return the first names, and how many more there are.
+
+    >>> _joined("abcde")
+    'a and b and c and 2 more'
+    """
+    more = [f"{len(names) - MAX_NAMED} more"] * (len(names) > MAX_NAMED)
+    return " and ".join([*names[:MAX_NAMED], *more])
 
 
 def significant(analysis: Analysis) -> str:
@@ -87,9 +96,9 @@ def condition_sentences(table: SummaryTable, title: str, analysis: Analysis) -> 
 
 
 def methods(
-    outline: StudyOutline,
     settings: Mapping[str, Mapping[str, Any]],
     extent: str,
+    table: SummaryTable,
     *,
     is_compared: bool,
 ) -> list[str]:
@@ -97,14 +106,14 @@ def methods(
 
     Parameters
     ----------
-    outline
-        The study.
     settings
         Settings of its conditions, by label.
     extent
         Conditions, seeds and episodes in words.
+    table
+        Its table.
     is_compared
-        Whether the study compares conditions.
+        Whether the page compares conditions.
     """
     own = list(settings.values())
     scenarios = [condition["scenario"] for condition in own]
@@ -115,16 +124,72 @@ def methods(
         "the whole team" if agents == ["team"] else " or ".join(f"each {a}" for a in agents)
     )
     sentences.append(f"Hierarchy: {_kinds(topologies)}, with one agent for {granularity}.")
-    sentences.append(f"Learner: {_kinds([condition['learner'] for condition in own])}.")
+    learners = [condition["learner"] for condition in own]
+    sentences.append(f"Learner: {_kinds(learners)}.")
+    if searches := _distinct(_search(one["decision"]) for one in learners if "decision" in one):
+        sentences.append(f"Search over joint actions: {'; '.join(searches)}.")
+    sentences += _failures(settings)
     sentences.append(f"Extent: {extent}.")
-    if len(outline.seeds) > 1:
-        sentences.append("Statistics: means over seeds with 95% confidence intervals.")
-        if is_compared:
-            sentences.append(
-                "Conditions are paired by seed, which determines the initial states of every "
-                "episode. p-values are adjusted by Holm's method, intervals are not."
-            )
+    if table.lines:
+        sentences.append(" ".join(map(str.strip, table.legend)))
+    if meaning := table.meanings.get(RECOVERED.heading):
+        sentences.append(f"{RECOVERED.heading.capitalize()}: {meaning}.")
+    if is_compared:
+        sentences.append(
+            "Conditions are paired by seed, which determines the initial states of every "
+            "episode. p-values are adjusted by Holm's method, intervals are not."
+        )
     return sentences
+
+
+def _search(decision: Mapping[str, Any]) -> str:
+    """Return the evaluator of a learner, its settings and its budget as text."""
+    evaluator = dict(decision["evaluator"])
+    kind = evaluator.pop("kind")
+    own = ", ".join(f"{key} = {show(value)}" for key, value in evaluator.items())
+    budget = decision["budget"]
+    limit = "" if budget is None else f", at most {budget} joint actions a decision"
+    return f"{kind} ({own}){limit}" if own else f"{kind}{limit}"
+
+
+def _failures(settings: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return a sentence on failures; none without failures.
+
+    Each failure has its conditions in parentheses, unless all conditions have it.
+    """
+    conditions: dict[str, list[str]] = {}
+    for condition, own in settings.items():
+        listed = (*own["scenario"].get("failures", ()), *own["topology"]["failures"])
+        for text in _distinct(map(_failure, listed)):
+            conditions.setdefault(text, []).append(condition)
+    texts = [
+        text if len(names) == len(settings) else f"{text} ({_joined(names)})"
+        for text, names in conditions.items()
+    ]
+    if not texts:
+        return []
+    return [f"Failures, by training episode counted from 0: {'; '.join(texts)}."]
+
+
+def _failure(own: Mapping[str, Any]) -> str:
+    """Return a failure as text: its kind, what fails, its settings, and its time.
+
+    >>> _failure({"kind": "seized", "wheels": ["robot1.left"], "episode": 8, "end_episode": 11})
+    'seized, wheels robot1.left, from episode 8 to episode 11'
+    """
+    rest = dict(own)
+    start = _moment(rest.pop("episode"), rest.pop("step", 0))
+    end, end_step = rest.pop("end_episode"), rest.pop("end_step", 0)
+    parts = [rest.pop("kind", "failure")]
+    for key, value in rest.items():
+        shown = ", ".join(map(str, value)) if isinstance(value, list) else value
+        parts += [] if shown is None else [f"{key} {shown}"]
+    until = "on" if end is None else f"to {_moment(end, end_step)}"
+    return f"{', '.join(parts)}, from {start} {until}"
+
+
+def _moment(episode: int, step: int) -> str:
+    return f"step {step} of episode {episode}" if step else f"episode {episode}"
 
 
 def _kinds(tables: Iterable[Mapping[str, Any]]) -> str:

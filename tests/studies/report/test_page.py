@@ -1,6 +1,7 @@
 import re
 import shutil
 import sqlite3
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,12 @@ from nested_agents import studies
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.page import page, unfolded
-from nested_agents.studies.report.sentences import main_title, verdict
+from nested_agents.studies.report.sentences import main_title, methods, verdict
 from nested_agents.studies.results.analysis import Analysis, Summary
 from nested_agents.studies.results.statistics import Estimate, exactly
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import DATABASE
+from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of
 from research import SPECS
 
@@ -35,6 +37,11 @@ def sections(html):
     return re.findall(r'<section id="(\w+)"', html)
 
 
+def methods_of(html):
+    section = html[html.index('<section id="methods">') :].partition("</section>")[0]
+    return unescape(section).replace("\xa0", " ")
+
+
 def test_a_finished_study_has_everything(html):
     assert sections(html) == [
         "summary", "table", "figures", "hierarchy", "replay", "methods", "spec", "versions",
@@ -52,12 +59,48 @@ def test_a_finished_study_has_everything(html):
 
 def test_methods_and_each_condition_are_described(html):
     assert "Task: box-pushing with 2 robots." in html
-    assert "Statistics: means over seeds with 95% confidence intervals." in html
+    described = methods_of(html)
+    assert "Search over joint actions: auto (exact_up_to = 5" in described
+    assert "Failures" not in described
+    assert "Means over 3 seeds with 95% intervals. Fewer than 8 seeds: " in described
+    assert "paired by seed" in described
+    assert "Holm" in described
     assert html.count("<li>default: evaluation success is ") == 1
     assert html.count("<li>frozen: evaluation success is ") == 1
     lead = html[html.index('<p class="lead">') :].partition("</p>")[0]
     assert "Evaluation success is the same with default and frozen, " in lead
     assert "Karigiannis" in html
+
+
+def test_methods_name_failures_their_times_and_their_conditions(kept, tmp_path):
+    seized = {"kind": "seized", "wheels": "robot1.front-left", "episode": 2, "end_episode": 3}
+    lost = {"kind": "lost", "agents": "*", "probability": 0.5, "episode": 1, "step": 4}
+    overrides = [
+        {"name": "sound"},
+        {"name": "lost", "scenario": {"failures": [seized]}, "topology": {"failures": [lost]}},
+    ]
+    spec = Spec.of({**SIZES, "overrides": overrides})
+    described = methods_of(page(kept(tmp_path, spec, done=0)))
+    assert "seized, wheels robot1.front-left, from episode 2 to episode 3 (lost)" in described
+    loss = "lost, agents *, probability 0.5, from step 4 of episode 1 on (lost)"
+    assert loss in described
+
+
+def test_methods_say_what_recovery_is(kept, tmp_path):
+    fault = {"kind": "seized", "wheels": "robot1.front-left", "episode": 5}
+    table = {
+        "study": "wheel-failure",
+        "seeds": 2,
+        "episodes": 10,
+        "scenario": {"failures": [fault]},
+    }
+    lines = [Summary("a", 2, {"recovered": exactly(1.0)})]
+    settings = kept(tmp_path, Spec.of(table), done=0)
+    assert "Recovered: " not in methods_of(page(settings)), "no trial has finished"
+    with Store.open(settings) as store:
+        described = methods(store.settings(), "", tabulate(lines), is_compared=False)
+    assert any(sentence.startswith("Recovered: share of seeds") for sentence in described)
+    assert not any("Holm" in sentence for sentence in described)
 
 
 def test_lines_are_joined_to_what_they_continue():
@@ -207,6 +250,7 @@ def test_a_study_of_team_sizes_has_a_section_on_scalability(kept, tmp_path):
     assert "scalability" in sections(html)
     for robots in (2, 4):  # hierarchies are compared within a size, not all with the first
         assert f"robots={robots}: evaluation success, minus that of chain" in html
+    assert "Holm" in methods_of(html)
     section = html[html.index('<section id="scalability">') :].partition("</section>")[0]
     assert "Evaluation success was measured with 2 to 4 robots" in section
     assert section.count("<svg viewBox") >= 4, "four panels"
