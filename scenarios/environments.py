@@ -45,7 +45,10 @@ def players_of(scenario: Scenario, players: Players) -> dict[str, list[int]]:
     if players == "team":
         return {"single": list(range(len(names)))}
     if players == "bodies":
-        return {names[body[0]].partition(".")[0]: list(body) for body in scenario.groups}
+        bodies = [names[body[0]].partition(".")[0] for body in scenario.groups]
+        if len(set(bodies)) < len(bodies):  # names of agents need not begin with their body
+            bodies = [names[body[0]] for body in scenario.groups]
+        return dict(zip(bodies, map(list, scenario.groups), strict=True))
     return {name: [i] for i, name in enumerate(names)}
 
 

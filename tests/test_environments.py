@@ -13,6 +13,7 @@ from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test, see
 from nested_agents.core.interface.scenario import checked_scenario
 from nested_agents.environments import WORLDS, env_id, register
 from nested_agents.scenarios import SCENARIOS
+from nested_agents.scenarios.environments import players_of
 
 OPTIONS: dict[str, dict[str, Any]] = {
     "BoxPushing": {"action_repeat": 2, "failures": [{"kind": "weak", "wheels": "*", "gain": 0.5}]},
@@ -90,6 +91,12 @@ def test_bodies_are_players() -> None:
     assert env.possible_agents == ["robot1", "robot2", "robot3"]
     arm = pettingzoo.make("parallel", env_id("Arm"), players="bodies", joints=3)
     assert len(arm.possible_agents) == len(arm.scenario.groups)
+
+
+def test_bodies_whose_names_begin_alike_are_as_many_players() -> None:
+    scenario = checked_scenario(SCENARIOS.parsed("line-up").build())
+    scenario.agents, scenario.groups = ("team.a", "team.b"), ((0,), (1,))
+    assert players_of(scenario, "bodies") == {"team.a": [0], "team.b": [1]}
 
 
 @pytest.mark.parametrize(

@@ -144,7 +144,13 @@ def _values(player: Player, space: Space, levels: int) -> Sequence[FloatArray]:
         raise ValueError(
             f"{name}: {space}, allowed: bounds within {MAX_BOUND:,.0f}; wrap it in RescaleAction"
         )
-    return list(np.linspace(low, high, levels, dtype=float).T)
+    values = np.linspace(low, high, levels, dtype=float)
+    if np.issubdtype(space.dtype, np.integer):
+        most = int((high - low).min()) + 1
+        if levels > most:
+            raise ValueError(f"scenario.actions = {levels}: {name}: {space}, allowed: 2 to {most}")
+        values = np.rint(values)
+    return list(values.T)
 
 
 def _role(name: str) -> str:

@@ -143,7 +143,7 @@ class ActionScale:
         elif np.issubdtype(self.space.dtype, np.integer):
             values = np.rint(values)
         action = np.array(chosen, dtype=self.space.dtype)
-        action.ravel()[changed] = values[changed].astype(action.dtype)
+        action.flat[np.flatnonzero(changed)] = values[changed].astype(action.dtype)
         return action[()]  # Discrete actions are numbers, not arrays
 
 

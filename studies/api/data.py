@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ...core.interface.measures import RETURN, SUCCESS
 from ...core.numerics import pd
 from ...core.plugins.sources import Sources
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, expect
 from ..catalogue.study import analyse_as, draw_figures, load_study, notes_of
 from ..errors import SpecError
 from ..laws.size_axis import key_beside_size
@@ -28,7 +28,7 @@ from ..results.choices import choose_trials
 from ..results.comparison import compare_conditions, missing_reference, power_of_seeds
 from ..results.joining import join_sizes
 from ..results.measured import default_measure
-from ..results.notation import wrapped
+from ..results.notation import listed, wrapped
 from ..results.results import Results
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import control_lines
@@ -114,8 +114,19 @@ class StudyData:
             *missing_reference(self.results),
             *chain.from_iterable(sentences),
             *notes_of(self.analysis),
+            *self._not_shown,
             *self._of_controls,
         )
+
+    @property
+    def _not_shown(self) -> list[str]:
+        """Further evaluations that the study's table has not, in lines."""
+        table = self.table()
+        shown = " ".join((*table.titles, *(line.condition for line in table.lines)))
+        every = map(self.results.other_evaluations, self.conditions)
+        phases = {phase: name for own in every for name, phase in own.items()}
+        hidden = [phase for phase, name in phases.items() if name not in shown]
+        return listed("Further evaluations, see compare --phase", hidden)
 
     @property
     def _of_controls(self) -> tuple[str, ...]:
@@ -178,6 +189,7 @@ class StudyData:
 
     def where(self, choice: str) -> Self:
         """Return the trials that match a choice, such as ``"robots == 8 and seed < 5"``."""
+        expect("a choice, such as 'robots == 8'", str, where=choice)
         part = choose_trials(self.results, choice, self._settings)
         if not part.conditions:
             raise SpecError(f"where = {choice!r}: no finished trial matches")
@@ -191,6 +203,7 @@ class StudyData:
         SpecError
             If there is no such study.
         """
+        expect("the name of a study", str, study=name)
         own = Sources(Path())
         with own.active():
             load_study(name)

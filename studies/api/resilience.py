@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from numbers import Integral, Real
 
+from ...core.plugins.words import expect
 from ..errors import SpecError, refused
 from ..resilience.analysis import Resilience, TeamLosses
 from ..resilience.losses import losable_team, loss_sets, next_number, with_loss
@@ -25,8 +27,10 @@ def measure_resilience(
     tolerance: float,
 ) -> ResilienceReport:
     """Evaluate the kept teams of a study with losses; see `StudyResults.resilience`."""
+    expect("a whole number", Integral, sets=max_sets)
     if max_sets < 1:
         raise SpecError(f"sets = {max_sets}: must be 1 or more")
+    expect("a share", Real, tolerance=tolerance)
     if not 0.0 < tolerance < 1.0:
         raise SpecError(f"tolerance = {tolerance:g}: must be above 0 and below 1")
     name = results.main.name if measure is None else measure

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from math import inf
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 
@@ -123,6 +124,7 @@ def run(
     measures = examine(spec, may_fail=True)
     trials = [t for t in trials_of(spec) if not chosen or t.identity in chosen]
     check_workers(backend, jobs, address)
+    expect("a number of seconds", Real, checkpoint=checkpoint)
     if not 0.0 <= checkpoint < inf:
         raise SpecError(f"--checkpoint {checkpoint:g}: must be 0 or more seconds")
     with ExitStack() as stack:

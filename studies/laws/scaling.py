@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.numerics import pd
-from ...core.plugins.words import closest, show
+from ...core.plugins.words import closest, expect, show
 from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.differences import BySeed
@@ -19,6 +20,7 @@ from ..results.power import deviation_of
 from ..results.power_text import power_text
 from ..results.results import Results
 from ..results.statistics import Array
+from ..store.database import STAGE
 from . import fitting
 from .curves import POWER
 from .fitting import Law
@@ -243,10 +245,14 @@ def _varied(frame: pd.DataFrame) -> Array:
 def decisions_to_criterion(
     results: Results, measure: str, criterion: float
 ) -> dict[str, tuple[pd.Series, pd.Series]]:
-    """Return by condition decisions until the criterion, or all, and whether it was not reached."""
+    """Return by condition decisions until the criterion, or all, and whether it was not reached.
+
+    Those of a curriculum before are counted, too.
+    """
     rates = {m.name for m in results.measures if m.is_rate}
     if measure not in rates:
         raise SpecError(f"measure = {measure!r}: {closest(measure, rates)}; a rate has a criterion")
+    expect("a share", Real, criterion=criterion)
     if not 0.0 < criterion <= 1.0:
         raise SpecError(f"criterion = {show(criterion)}: must be above 0 and at most 1")
     samples = {}
@@ -260,8 +266,12 @@ def decisions_to_criterion(
         is_there = means >= criterion - 1e-12
         is_censored = ~is_there.any(axis=1)
         first = np.where(is_censored, means.shape[1] - 1, is_there.argmax(axis=1))
-        decisions = spent[np.arange(len(spent)), first + width - 1]
         seeds = results.seeds(condition)
+        decisions = spent[np.arange(len(spent)), first + width - 1] + sum(
+            results.by_seed(condition, stage, "steps").sum(axis=1).reindex(seeds).to_numpy()
+            for stage in results.phases
+            if stage.startswith(STAGE) and results.has(condition, stage)
+        )
         samples[condition] = pd.Series(decisions, seeds, float), pd.Series(is_censored, seeds)
     return samples
 

@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ...core.numerics import pd
-from ..results.statistics import Array, Estimate
+from ..results.statistics import Array, Estimate, exactly
 from .inference import ratio_interval
 
 Scaling = Literal["strong", "weak"]
@@ -81,7 +81,8 @@ def speedups(times: pd.DataFrame, scaling: Scaling) -> dict[float, dict[str, Est
     result = {}
     for size, own in times.items():
         factor = float(size / first)
-        ratio = ratio_interval(base.to_numpy(), own.to_numpy())
+        is_first = size == first
+        ratio = exactly(1.0) if is_first else ratio_interval(base.to_numpy(), own.to_numpy())
         speedup = Estimate(*(end * (factor if scaling == "weak" else 1.0) for end in ratio))
         result[float(size)] = {
             "speed-up": speedup,

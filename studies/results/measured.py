@@ -18,9 +18,16 @@ from .scores import LAST_STEP
 
 
 def title_of(measure: Measure, phase: str) -> str:
-    """Return the title of a measure in a phase, ``evaluation success`` or ``success, eight``."""
+    """Return the title of a measure in a phase.
+
+    >>> title_of(SUCCESS, "evaluation"), title_of(SUCCESS, "evaluation:eight")
+    ('evaluation success', 'success, eight')
+    >>> title_of(SUCCESS, "training:first stage")
+    'training success, first stage'
+    """
     kind, _, name = phase.partition(":")
-    return f"{measure.heading}, {name}" if name else f"{kind} {measure.heading}".lstrip()
+    title = f"{'' if name and kind == 'evaluation' else kind} {measure.heading}".lstrip()
+    return f"{title}, {name}" if name else title
 
 
 def usual_phase(results: Results, measure: str) -> str:

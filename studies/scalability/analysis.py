@@ -145,6 +145,8 @@ class Scalability:
             f"{title[0].upper()}{title[1:]} was measured with {sizes[0]:g} to {sizes[-1]:g} "
             f"{data.size}; the task {GROWTH[data.scaling]}."
         )
+        if len({frozenset(own.index) for own in data.performances.values()}) > 1:
+            yield "Not all teams have the same seeds; they are compared on those that they share."
         yield from self._best_sentences()
         yield from self._size_sentences()
         yield from self._crossover_sentences()
@@ -158,7 +160,7 @@ class Scalability:
         largest = data.all_sizes[-1]
         if self.best is not None:
             names, probability = self.best
-            mean = format_estimate(data.performance_estimates[names[0], largest])
+            mean = self._mean_of(names[0], largest)
             has = f"{names[0]} has" if len(names) == 1 else f"{len(names)} hierarchies share"
             yield (
                 f"With {largest:g} {data.size}, {has} the best mean of the "
@@ -170,6 +172,15 @@ class Scalability:
                 f"The next sentences name the {len(self.named)} best hierarchies with "
                 f"{largest:g} {data.size}; the tables have all."
             )
+
+    def _mean_of(self, hierarchy: str, size: float) -> str:
+        """Return the performance at a size, of the seeds that all hierarchies there share."""
+        data = self.data
+        names, (values,) = data.paired_at(size, [])
+        if all(len(data.performances[name, size]) == len(values) for name in names):
+            return format_estimate(data.performance_estimates[hierarchy, size])
+        mean = format_number(values[:, names.index(hierarchy)].mean())
+        return f"{mean} over the {len(values)} seeds that all have"
 
     def _size_sentences(self) -> Iterator[str]:
         size = self.data.size
@@ -208,10 +219,10 @@ class Scalability:
         if known:
             yield "These intervals are Student's over seeds, not adjusted for several pairs."
         pairs = [*combinations(self.named, 2)]
-        apart = [pair for pair in pairs if len({*data.sizes(pair[0])} & {*data.sizes(pair[1])}) < 2]
+        apart = [p for p in pairs if not fronts.can_cross(fronts.differences_by_size(data, *p))]
         if apart:
             names = "; ".join(f"{one} and {two}" for one, two in apart)
-            yield f"No crossover can be found without two sizes that both have: {names}."
+            yield f"No crossover can be found without two sizes and seeds that both have: {names}."
         if len(apart) == len(pairs):
             return
         other = "other " if known else ""

@@ -207,14 +207,25 @@ def best_hierarchies(data: ScalabilityData) -> tuple[tuple[str, ...], float] | N
     return tuple(names[k] for k in best), probability
 
 
+def differences_by_size(data: ScalabilityData, one: str, other: str) -> pd.DataFrame:
+    """Return how much better one hierarchy is than another, by shared seed and shared size."""
+    sizes = [n for n in data.sizes(one) if n in data.sizes(other)]
+    values = paired([data.performances[name, n] for name in (one, other) for n in sizes])
+    differences = data.sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
+    return pd.DataFrame(differences, columns=sizes)
+
+
+def can_cross(differences: pd.DataFrame) -> bool:
+    """Return whether differences have the two seeds and two sizes that a crossover takes."""
+    return min(differences.shape) > 1
+
+
 def crossovers(data: ScalabilityData) -> list[tuple[str, str, Estimate]]:
     """Return better and worse hierarchy, and the size from which on, of all pairs that cross."""
     changes = []
     for better, worse in permutations(data.hierarchies, 2):
-        sizes = [n for n in data.sizes(better) if n in data.sizes(worse)]
-        values = paired([data.performances[name, n] for name in (better, worse) for n in sizes])
-        if len(sizes) > 1 and len(values) > 1:
-            differences = data.sign * (values[:, : len(sizes)] - values[:, len(sizes) :])
-            size = sign_change(sizes, differences)
+        differences = differences_by_size(data, better, worse)
+        if can_cross(differences):
+            size = sign_change([*differences], differences.to_numpy())
             changes += [(better, worse, size)] if size is not None else []
     return changes

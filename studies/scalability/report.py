@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, get_args
 
+from ...core.plugins.words import expect
 from ..errors import SpecError
 from ..laws.size_axis import SizeAxis
 from ..laws.universal import Scaling
@@ -116,6 +117,7 @@ def analyze(
     budget: str,
 ) -> ScalabilityReport:
     """Return the report of results with the settings of their conditions, see `StudyResults`."""
+    expect("limits of costs, such as 'messages <= 50'", str, budget=budget)
     if scaling not in (None, *get_args(Scaling)):
         raise SpecError(f"scaling = {scaling!r}: allowed are {', '.join(get_args(Scaling))}")
     growth, remark = (scaling, "") if scaling else _scaling_of(results, settings, size)

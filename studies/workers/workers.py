@@ -14,13 +14,14 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from multiprocessing import get_context
+from numbers import Integral
 from typing import Any, get_args
 
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from ...core.isolation import safe_path
-from ...core.plugins.words import closest
+from ...core.plugins.words import closest, expect
 from ...core.shell import command_line
 from ..errors import SpecError
 from ..trials.trial import Trial
@@ -38,7 +39,8 @@ from .runner import (
 
 
 def check_jobs(jobs: int) -> None:
-    """Raise if the number of processes is below one."""
+    """Raise if the number of processes is no whole number above 0."""
+    expect("a whole number", Integral, jobs=jobs)
     if jobs < 1:
         raise SpecError(f"--jobs {jobs}: must be at least 1")
 

@@ -41,6 +41,14 @@ class Told(gymnasium.Env):
         return self.place, 0.0, False, False, {}
 
 
+def test_the_order_in_memory_of_an_action_does_not_matter() -> None:
+    env = faults.FaultyEnv(Told(Box(-1.0, 1.0, (2, 3))), [faults.Weak(actuators="*", gain=0.25)])
+    env.reset(seed=0)
+    for action in (np.ones((2, 3), np.float32), np.ones((3, 2), np.float32).T):
+        env.step(action)
+        assert (env.unwrapped.told == 0.25).all()
+
+
 class Pair(ParallelEnv):
     """Two agents who add their actions up."""
 

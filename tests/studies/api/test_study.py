@@ -91,6 +91,27 @@ def test_conditions_are_compared(study) -> None:
     assert found.table.latex.startswith("% needs \\usepackage{booktabs}")
 
 
+@pytest.mark.parametrize(
+    ("method", "options", "complaint"),
+    [
+        ("where", {"choice": None}, "where = None"),
+        ("as_study", {"name": 5}, "study = 5"),
+        ("scalability", {"budget": 5}, "budget = 5"),
+        ("scalability", {"criterion": "a", "size": "seed"}, "size = 'seed'"),
+    ],
+)
+def test_wrong_arguments_are_named(study, method, options, complaint) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        getattr(study, method)(**options)
+
+
+@pytest.mark.parametrize("jobs", ["2", 1.5, True, 0])
+def test_jobs_are_a_whole_number(jobs, tmp_path) -> None:
+    with pytest.raises(ValueError, match="jobs"):
+        na.run({"seeds": 1}, tmp_path / "out", jobs=jobs)
+    assert not (tmp_path / "out").exists()
+
+
 def test_trials_are_asked_again_by_another_study(study) -> None:
     again = study.as_study("ablation")
     assert again.table().titles[0] == "training success"

@@ -12,7 +12,7 @@ import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.laws.scaling import scaling_law
+from nested_agents.studies.laws.scaling import decisions_to_criterion, scaling_law
 from nested_agents.studies.results.results import from_arrays
 from research import RESULTS
 
@@ -72,6 +72,15 @@ def test_runs_of_fewer_episodes_are_censored_where_they_end() -> None:
     assert law.sample.censored.tolist() == expected.sample.censored.tolist()
     assert law.sample.censored[1, 2]
     assert np.exp(law.sample.values[1, 2]) == pytest.approx(10 * 80)
+
+
+def test_decisions_of_a_curriculum_count(tmp_path) -> None:
+    stage = {"name": "one", "episodes": 3, "scenario": {"carts": 1}}
+    spec = CARTS | {"preset": "own-value", "learner": {"weights": "role"}, "curriculum": [stage]}
+    results = na.run(spec, tmp_path / "out", jobs=1, progress=False).results
+    for condition, (decisions, _) in decisions_to_criterion(results, "success", 1.0).items():
+        stages = (results.values(condition, "steps", p) for p in ("training:one", "training"))
+        assert decisions.tolist() == sum(own.sum(axis=1) for own in stages).tolist()
 
 
 @pytest.mark.parametrize(

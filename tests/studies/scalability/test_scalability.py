@@ -130,8 +130,23 @@ def test_hierarchies_without_two_sizes_in_common_are_named(tmp_path, sizes, is_s
     path = tmp_path / "scores.csv"
     path.write_text("\n".join(["hierarchy,agents,seed,score", *rows]))
     paragraph = load(path).scalability().paragraph
-    assert ("two sizes that both have: chain and star" in paragraph) != is_searched
+    assert ("two sizes and seeds that both have: chain and star" in paragraph) != is_searched
     assert ("There is no crossover" in paragraph) == is_searched
+
+
+def test_hierarchies_of_different_seeds_are_compared_on_those_they_share(tmp_path):
+    path = tmp_path / "scores.csv"
+    for chosen, said in (
+        (range(2), "0.9 over the 2 seeds that all have"),
+        (range(6, 9), "two sizes and seeds that both have"),
+    ):
+        rows = [f"chain,{n},{seed},{0.9 - seed / 10}" for n in (2, 4) for seed in range(6)]
+        rows += [f"star,{n},{seed},0.5" for n in (2, 4) for seed in chosen]
+        path.write_text("\n".join(["hierarchy,agents,seed,score", *rows]))
+        paragraph = load(path).scalability().paragraph
+        assert "Not all teams have the same seeds" in paragraph
+        assert said in paragraph or "0.85 over the 2 seeds" in paragraph
+        assert ("There is no crossover" in paragraph) == (len(chosen) == 2)
 
 
 def test_the_scaling_may_be_named():
