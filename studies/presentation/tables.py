@@ -22,7 +22,7 @@ from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
 from ..errors import WIDTH, SpecError
 from ..results.analysis import Summary
-from ..results.notation import format_estimate, wrapped
+from ..results.notation import P_ADJUSTED, P_RAW, format_estimate, format_p, wrapped
 from ..results.spreadsheet import harmless
 from ..results.statistics import FEW, exactly, plain, stack_estimates
 from .legend import meanings
@@ -196,14 +196,14 @@ class SummaryTable:
     @cached_property
     def cells(self) -> pd.DataFrame:
         """Estimates with intervals as text, empty where there is none, a row for each line."""
-        estimates = [[line.estimates.get(title) for title in self.titles] for line in self.lines]
-        rows = [[format_estimate(e) if e else "" for e in row] for row in estimates]
+        rows = [[_cell(line, title) for title in self.titles] for line in self.lines]
         return pd.DataFrame(rows, columns=list(self.titles), dtype=object)
 
     def text(self, width: int = WIDTH) -> str:
         """Return a line of estimates for each condition, each with its 95% interval.
 
-        The number of seeds stands after the label if conditions differ in it.
+        The number of seeds stands after the label if conditions differ in it. There are no columns
+        of p-values, because the verdicts below the table have them.
         """
         if not self.lines:
             return ""
@@ -211,7 +211,8 @@ class SummaryTable:
             line.condition if self.seeds else f"{line.condition} ({count(line.seeds, 'seed')})"
             for line in self.lines
         ]
-        return text_of(self.cells.apply(_aligned).set_axis(labels), width)
+        cells = self.cells.drop(columns=[P_ADJUSTED, P_RAW], errors="ignore")
+        return text_of(cells.apply(_aligned).set_axis(labels), width)
 
     @property
     def seeds(self) -> int:
@@ -298,6 +299,16 @@ class SummaryTable:
 
     def _repr_html_(self) -> str:
         return self.html
+
+
+def _cell(line: Summary, title: str) -> str:
+    """Return an estimate of a line as text; empty if there is none."""
+    estimate = line.estimates.get(title)
+    if estimate is None:
+        return ""
+    if title in (P_ADJUSTED, P_RAW):
+        return format_p(float(estimate.value)).removeprefix("= ")
+    return format_estimate(estimate)
 
 
 def tabulate(

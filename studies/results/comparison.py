@@ -24,7 +24,7 @@ from .differences import (
     select_shared,
 )
 from .measured import default_measure, title_of, values_by_seed, values_of
-from .notation import listed, wrapped
+from .notation import P_ADJUSTED, P_RAW, listed, wrapped
 from .power_text import power_lines
 from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME, within
 from .results import STEPS, Results, row_means
@@ -200,12 +200,14 @@ def _group(
 
 
 def _difference_columns(difference: Difference, measure: Measure) -> dict[str, Estimate]:
-    """Return the columns of a difference: the difference and two effect sizes."""
+    """Return the columns of a difference: the difference, two effect sizes, and p."""
     title = "P(improvement)" if measure.better else "P(higher)"
     return {
         DIFFERENCE_TITLES[difference.paired]: difference.estimate,
         title: difference.improvement(measure.better),
         "Cliff's delta": exactly(difference.cliffs_delta),
+        P_ADJUSTED: exactly(difference.p),
+        P_RAW: exactly(difference.raw),
     }
 
 

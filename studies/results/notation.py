@@ -12,6 +12,8 @@ from textwrap import wrap
 from ..errors import WIDTH
 from .statistics import Estimate
 
+P_ADJUSTED, P_RAW = "p", "p unadjusted"
+"""Headings of columns of p-values."""
 MAX_DECIMALS = 2
 MIN_SCIENTIFIC = 1e6
 """Magnitude from which on a number is shown with a power of ten."""

@@ -9,7 +9,7 @@ import pandas as pd
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.presentation.tables import tabulate, write_rows
 from nested_agents.studies.results.analysis import Summary
-from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.results.statistics import Estimate, exactly
 
 
 def estimate(*numbers: float) -> Estimate:
@@ -93,6 +93,17 @@ def test_cells_are_as_in_the_terminal():
     table = tabulate(LINES)
     assert table.titles == ("success", "x_1 [m]")
     assert table.cells.values.tolist() == [["0.33 [0.20, 0.50]", "2 [1, 3]"], ["0", ""]]
+
+
+def test_p_values_are_for_other_programs_and_papers():
+    estimates = {"difference": exactly(0.5), "p": exactly(0.046), "p unadjusted": exactly(0.0002)}
+    table = tabulate([Summary("a", 8, {"success": exactly(0.4)}), Summary("b", 8, estimates)])
+    assert list(table.cells.loc[1]) == ["", "0.50", "0.046", "< 0.001"]
+    assert list(table.cells.loc[0])[2:] == ["", ""]
+    first, second = csv.DictReader(io.StringIO(table.csv))
+    assert (first["p"], second["p"], second["p unadjusted"]) == ("", "0.046", "0.0002")
+    assert "0.046" in table.latex
+    assert "0.046" not in table.text(), "the verdicts below have it"
 
 
 def test_an_empty_table():

@@ -172,6 +172,7 @@ def test_effect_sizes_stand_in_the_table() -> None:
     higher = np.mean([(a > b) + 0.5 * (a == b) for a in own for b in base])
     assert float(worse["P(improvement)"].value) == pytest.approx(higher)
     assert float(worse["Cliff's delta"].value) == pytest.approx(2.0 * higher - 1.0)
+    assert (worse["p"].value, worse["p unadjusted"].value) == (difference.p, difference.raw)
     limited = replace(hierarchies(CHANCES).frames(), step_limits=(450, 450))
     steps = compare_conditions(limited, "steps", by="topology")
     own, base = steps.groups[1].differences[0].values
