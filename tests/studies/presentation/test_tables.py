@@ -9,7 +9,7 @@ import pandas as pd
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.presentation.tables import tabulate, write_rows
 from nested_agents.studies.results.analysis import Summary
-from nested_agents.studies.results.statistics import Estimate, exactly
+from nested_agents.studies.results.statistics import Estimate, bootstrap, exactly
 
 
 def estimate(*numbers: float) -> Estimate:
@@ -104,6 +104,17 @@ def test_p_values_are_for_other_programs_and_papers():
     assert (first["p"], second["p"], second["p unadjusted"]) == ("", "0.046", "0.0002")
     assert "0.046" in table.latex
     assert "0.046" not in table.text(), "the verdicts below have it"
+
+
+def test_means_at_an_end_of_their_range_are_told_from_student_intervals():
+    def legend(values, bounds):
+        estimates = {"recovery time": bootstrap(values, bounds=bounds)}
+        return " ".join(tabulate([Summary("a", 3, estimates)]).legend)
+
+    assert "scaled" in legend([8.0, 8.0, 8.0], (0.0, 8.0))
+    assert "scaled" in legend([0.0, 0.0, 0.0], (0.0, 8.0))
+    assert "scaled" not in legend([1.0, 1.0, 1.0], (0.0, 1.0)), "a rate"
+    assert "scaled" not in legend([7.0, 7.0, 8.0], (0.0, 8.0)), "the interval is cut, not scaled"
 
 
 def test_an_empty_table():
