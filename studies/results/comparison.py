@@ -294,12 +294,13 @@ def _groups(
 
 
 def _level(key: str, value: object) -> str:
-    """Return a value of a column as a label; text is its own label.
+    """Return a value of a column as a label; text is its own label, except a truth value.
 
-    >>> _level("scenario.robots", 8), _level("topology", "chain")
-    ('robots=8', 'chain')
+    >>> _level("scenario.robots", 8), _level("topology", "chain"), _level("numbered", "true")
+    ('robots=8', 'chain', 'numbered=true')
     """
-    return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
+    own = label({key: value})
+    return own if isinstance(value, str) else f"{key.rpartition('.')[2]}={own}"
 
 
 def _put_first(

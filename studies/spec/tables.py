@@ -159,15 +159,22 @@ LONGEST_TABLE = 40
 def label(point: SpecTable, name: str = "") -> str:
     """Return a short name for a point of the sweeps of an override.
 
+    A value alone is its own label, but a truth value is named after its key.
+
     Examples
     --------
     >>> label({"preset": "frozen"}), label({"preset": "default", "learner.rule_base.order": 2})
     ('frozen', 'default, order=2')
     >>> label({"scenario.robots": 3}, "no replay")
     'no replay, robots=3'
+    >>> label({"learner.self_model.enabled": False}), label({"scenario.numbered": True})
+    ('self_model.enabled=false', 'numbered=true')
     """
     if len(point) == 1 and not name:
-        return _brief(next(iter(point.values())))
+        [(key, value)] = point.items()
+        brief = _brief(value)
+        parts = key.split(".")[-2 if key.endswith(".enabled") else -1 :]
+        return f"{'.'.join(parts)}={brief}" if brief in ("true", "false") else brief
     last = [key.rpartition(".")[2] for key in point]
     parts = [name] if name else []
     for key, short in zip(point, last, strict=True):

@@ -214,11 +214,16 @@ def analyse(results: Results) -> Analysis:
 
 
 def _unmeasured(courses: Sequence[Course]) -> Iterator[str]:
-    """Yield how many seeds had no success before the failure, a line for each fault."""
+    """Yield how many seeds had no success before the failure, a line for the rows with a number."""
     yield "Recovery and loss are not measured for seeds without success before the failure:"
-    for fault, had in {c.fault: c.measured.had_success for c in courses}.items():
+    rows: dict[tuple[str, str], list[str]] = {}
+    for course in courses:
+        had = course.measured.had_success
+        missing = f"{len(had) - had.sum()} of {len(had)} seeds"
         if not had.all():
-            yield f"  {fault}: {len(had) - had.sum()} of {len(had)} seeds"
+            rows.setdefault((course.fault, missing), []).append(course.adapts)
+    for (fault, missing), adapts in rows.items():
+        yield from wrapped(f"{fault} ({', '.join(adapts)}): {missing}", "  ")
 
 
 def courses_of(results: Results) -> list[Course]:

@@ -82,7 +82,7 @@ def test_recovery_is_compared_from_the_failure_on() -> None:
         own = compared.groups[0].values["4 wheels, seized, enabled=false"]
         assert own.tolist() == course.measured[name].tolist()
     compared = compare_conditions(results, "recovery time [episodes]", by="enabled")
-    assert {d.condition for d in compared.differences} == {"true"}
+    assert {d.condition for d in compared.differences} == {"self_model.enabled=true"}
     kept = compare_conditions(results, "recovered", "weights kept")
     assert kept.title == "recovered, weights kept"
     assert kept.differences[0].estimate.value > 0.5, "the self-model adapts, nothing does not"
@@ -206,10 +206,21 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
     for line in analysis.table:
         assert list(line.estimates) == ["before", "just after", AT_END]
     text = " ".join(" ".join(analysis.notes).split())
-    assert "not measured for seeds without success before the failure: fault:" in text
+    assert "not measured for seeds without success before the failure: fault (" in text
     with pytest.raises(SpecError, match="'recovered': no seed succeeded before a failure began"):
         compare_conditions(results.frames(), "recovered")
     assert default_measure(results.frames()) == "success"
+
+
+def test_rows_with_other_seeds_without_success_are_named_apart() -> None:
+    results = wheel_failure(ENDS)
+    results.training["4 wheels, seized, enabled=false"]["success"][:2] = 0
+    results.training["4 wheels, seized, enabled=true"]["success"][:1] = 0
+    notes = analyse(results.frames()).notes
+    seeds = len(results.seeds["4 wheels, seized, enabled=true"])
+    assert f"  4 wheels, seized (nothing, weights): 2 of {seeds} seeds" in notes
+    assert f"  4 wheels, seized (self-model, both): 1 of {seeds} seeds" in notes
+    assert not any("2 wheels" in note and "of" in note.split(": ")[-1] for note in notes)
 
 
 def test_a_comparison_names_the_seeds_without_success_before_the_failure() -> None:
