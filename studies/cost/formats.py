@@ -183,6 +183,8 @@ def _constants(rows: Sequence[CostRow], frame: pd.DataFrame) -> str:
 
 def _legend(rows: Sequence[CostRow], frame: pd.DataFrame) -> Iterator[str]:
     yield "Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23."
+    if "ratio" in frame:
+        yield "ratio: operations of the single agent over those of the nested agents."
     constants = _constants(rows, frame)
     yield f"{constants[0].upper()}{constants[1:]}."
     if "memberships" in _varied(frame):
