@@ -225,7 +225,8 @@ class BatchTD(Learner):
         place = np.empty(self._n_states, dtype=np.int64)
         for own in places:
             place[own] = np.arange(len(own))
-        follower = np.where(follower < 0, follower, place[follower])
+        is_known = follower >= 0
+        follower[is_known] = place[follower[is_known]]
         return self._all("rewards"), follower, places
 
     def states_of(self, row: int) -> FloatArray:

@@ -95,6 +95,18 @@ def test_batch_td_is_the_ridge_regression_written_out(
     assert learner.theta == pytest.approx(expected, rel=0, abs=1e-12)
 
 
+def test_a_single_after_state_is_regressed_on() -> None:
+    """One agent whose first episode has one step, after which it was cut off or ended."""
+    of_one_agent = episodes_of(np.random.default_rng(1), 1)
+    for first in (1, 3):
+        learner = BatchTD(BatchTDSettings(), fuzzy("triangular"), np.arange(1))
+        episodes = of_one_agent[first:] + of_one_agent[:first]
+        for episode in episodes:
+            feed(learner, episode)
+        expected = ridge_by_hand(fuzzy("triangular"), episodes, BatchTDSettings())
+        assert learner.theta == pytest.approx(expected, rel=0, abs=1e-12)
+
+
 def test_batch_td_solves_a_known_chain() -> None:
     # The chain of test_td: V(4) = 0.3 / 0.1 = 3, 2.7, -2 + 2.43 = 0.43, 0.387, 1 + 0.3483. The
     # targets stay within the range -2 / 0.1 to 1 / 0.1 of discounted sums.
