@@ -157,5 +157,6 @@ def _own_variable_moved(
             for j in np.flatnonzero(moved):
                 yield (
                     f"{space.variables[j].name} of agent {agent} changes with the actions of "
-                    f"others, n_own = {space.n_own} says it does not"
+                    f"others, n_own = {space.n_own} says it does not; list it after the own "
+                    "variables and lower n_own"
                 )

@@ -573,7 +573,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "not own": (
         inexact(n_own=2),
-        "predictions: lead of agent 0 changes with the actions of others, n_own = 2 says it does",
+        "predictions: lead of agent 0 changes with the actions of others, n_own = 2 .* lower n_own",
     ),
     "own of another": (
         inexact(lambda p, i, a: p.states(i, a[:, ::-1]), step=backwards),
