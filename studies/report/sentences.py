@@ -76,7 +76,7 @@ def significant(analysis: Analysis) -> str:
     compared = [d.p < LEVEL for d in chain.from_iterable(analysis.differences.values())]
     if not compared:
         return ""
-    verb = "is" if sum(compared) == 1 else "are"
+    verb = "is" if 1 in (sum(compared), len(compared)) else "are"
     return f"{sum(compared)} of {count(len(compared), 'difference')} {verb} significant"
 
 

@@ -69,6 +69,7 @@ def test_methods_and_each_condition_are_described(html):
     assert html.count("<li>frozen: evaluation success is ") == 1
     lead = html[html.index('<p class="lead">') :].partition("</p>")[0]
     assert "Evaluation success is the same with default and frozen, " in lead
+    assert "0 of 1 difference is significant" in lead
     assert "Karigiannis" in html
 
 
