@@ -200,17 +200,22 @@ class Messages:
             self.left |= self._masks[k]
 
     def _transmit(self, senders: IntArray, history: Sequence[IntArray], age: int) -> Received:
-        """Return what arrives of the last joint action of a history, sent `age` decisions ago."""
+        """Return what arrives of the last joint action of a history, sent `age` decisions ago.
+
+        Delays come before other failures, and of several delays the longest counts.
+        """
         actions = history[-1][senders]
         ages = np.full(len(senders), age)
-        for k in self._active:
+        delays = [failure.history_length for failure in self.failures]
+        for k in sorted(self._active, key=lambda k: (delays[k] == 0, delays[k])):
             affected = np.flatnonzero(self._masks[k][senders])
             past = [joint_action[senders[affected]] for joint_action in history[:-1]]
             sent = actions[affected]
             arrived = self.failures[k].passed(sent, past, self._n_actions, self._rng)
-            delay = self.failures[k].history_length
-            is_garbled = (delay == 0) & (arrived != sent)
-            ages[affected] = np.where(is_garbled, GARBLED, ages[affected] + delay)
+            if delays[k]:
+                ages[affected] = age + delays[k]
+            else:
+                ages[affected] = np.where(arrived != sent, GARBLED, ages[affected])
             actions[affected] = arrived
             is_received = actions != LOST
             senders = senders[is_received]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.hierarchy.failures import (
+    GARBLED,
     AbsentAgents,
     DelayedMessages,
     LostMessages,
@@ -71,6 +72,28 @@ def test_noise_alters_what_is_said_by_whom_it_befalls_alone() -> None:
     said = [heard(made, 3) for _ in range(400)]
     assert {(s[0], s[2]) for s in said} == {(3, 0)}
     assert np.bincount([s[1] for s in said], minlength=4) == pytest.approx([100] * 4, abs=35)
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_several_failures_of_one_agent_delay_first(is_first: bool) -> None:
+    """The longest delay counts, and what is garbled stays so: its payload is lost, not late."""
+    delay = [DelayedMessages(agents="a", decisions=n) for n in (2, 1)]
+    noise = NoisyMessages(agents="a", probability=1.0)
+    made = messages(*delay)
+    made.reset(0, 0)
+    for n in range(3):
+        made.advance(np.array([n, 3, 3]))
+    _, actions, ages = made.received(1, DECIDED)
+    assert (actions.tolist(), ages.tolist()) == ([1], [2])
+    garbled = messages(*(delay[1], noise)[:: 1 if is_first else -1])
+    drawn = set()
+    for seed in range(20):
+        garbled.reset(seed, 0)
+        garbled.advance(np.array([1, 3, 3]))
+        _, actions, ages = garbled.received(1, DECIDED)
+        drawn |= {(*actions.tolist(), *ages.tolist())}
+    assert {age for action, age in drawn if action != 1} == {GARBLED}
+    assert len({action for action, _ in drawn}) > 1
 
 
 def test_who_is_absent_says_nothing() -> None:
