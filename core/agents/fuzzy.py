@@ -6,7 +6,8 @@ its present state. Consequent weights belong to an agent or to a role.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from typing import Self
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..interface.agents import AgentContext, Agents, Counts, StateDict, add_pref
 from ..interface.experience import Experience, Observation
 from ..interface.measures import Measure
 from ..interface.prediction import NOT_EXPLORING, UNPREDICTED
-from ..interface.scenario import carried_rows, owners_of, rows_of
+from ..interface.scenario import carried_rows, check_transfer, owners_of, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..models.predictors import GivenPredictor, Mirror
@@ -285,9 +286,25 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         self.counts.weight_updates += updates
 
     @property
-    def _owners(self) -> list[str]:
+    def owners(self) -> list[str]:
         """The owner of each member's weights."""
         return owners_of(self.scenario, self.members, shared=self.settings.weights == "role")
+
+    def _rows_carried(self, owners: Sequence[str]) -> IntArray:
+        """Return the row of trained weights with these owners from which each row starts."""
+        return carried_rows(owners, self.owners, shared=self.settings.weights == "role")
+
+    def assign_rows(self, owners: Sequence[str]) -> None:
+        """Give rows of weights and experience, loaded in the order of their owners, to these.
+
+        Raises
+        ------
+        ValueError
+            If they are not the owners of these agents' weights; one line.
+        """
+        rows = self._rows_carried(owners)
+        if (rows != np.arange(len(rows))).any():
+            self.learner.warm_start(deepcopy(self.learner), rows)
 
     def warm_start(self, former: Self) -> None:
         """Start from agents with the same settings that learned in another scenario.
@@ -300,13 +317,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         ValueError
             If the learner or the exploration does not support it; one line.
         """
-        rows = carried_rows(
-            former.scenario,
-            self.scenario,
-            former._owners,
-            self._owners,
-            shared=self.settings.weights == "role",
-        )
+        check_transfer(former.scenario, self.scenario)
+        rows = self._rows_carried(former.owners)
         self.learner.warm_start(former.learner, rows)
         self.explorer.warm_start(former.explorer)
         self.rng.bit_generator.state = former.rng.bit_generator.state

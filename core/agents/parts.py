@@ -22,12 +22,15 @@ from ..interface.agents import (
 from ..interface.scenario import Scenario
 from ..numerics import AnyArray
 from ..plugins import sources
+from .fuzzy import FuzzyAgents
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
 
-OF_A_RUN = ("generator", "explorer", "seen", "given")
+OF_A_RUN = ("generator", "explorer", "seen", "given", "learner.trace", "learner.previous")
 """Saved arrays that belong to a run and are no learned weights."""
+OWNERS = "owners"
+"""Array of a team's file: the owner of each member's weights, an agent or a role."""
 
 
 def build_parts(
@@ -80,12 +83,24 @@ def weight_bytes_of(parts: Sequence[AnyAgents]) -> int:
 
 def state_of(parts: Sequence[AnyAgents]) -> StateDict:
     """Return the saved state of all parts as named arrays."""
-    if len(parts) == 1:
-        return parts[0].state_dict()
-    state: StateDict = {}
-    for k, part in enumerate(parts):
-        state |= add_prefix(f"part{k}.", part.state_dict())
-    return state
+    return _joined([part.state_dict() for part in parts])
+
+
+def owners_in(parts: Sequence[AnyAgents]) -> StateDict:
+    """Return the owners of all parts' weights as named arrays, for `begin_with`."""
+    owners = [{OWNERS: np.array(p.owners)} if isinstance(p, FuzzyAgents) else {} for p in parts]
+    return _joined(owners)
+
+
+def _joined(states: Sequence[StateDict]) -> StateDict:
+    """Return the arrays of all parts; those of several parts are named after them."""
+    if len(states) == 1:
+        return states[0]
+    return {
+        name: array
+        for k, state in enumerate(states)
+        for name, array in add_prefix(f"part{k}.", state).items()
+    }
 
 
 def load_state(parts: Sequence[AnyAgents], state: Mapping[str, AnyArray]) -> None:
@@ -102,7 +117,7 @@ def load_state(parts: Sequence[AnyAgents], state: Mapping[str, AnyArray]) -> Non
 
 
 def begin_with(agents: AnyAgents, file: str, part: int) -> None:
-    """Initialize the agents of a part with the weights of a saved team.
+    """Initialize the agents of a part with the weights of a saved team, by agent or role.
 
     Random numbers, exploration and counts of actions stay those of the agents. The learner may
     differ if the weights fit: ``frozen`` can use those of ``batch-td``.
@@ -139,7 +154,14 @@ def begin_with(agents: AnyAgents, file: str, part: int) -> None:
                 f"{where}: {name} has shape {array.shape}, these agents need {own[name].shape}; "
                 "with learner.weights = 'role', teams of other sizes can share weights"
             )
+    if isinstance(agents, FuzzyAgents) and OWNERS not in kept and len(agents.learner.theta) > 1:
+        raise ValueError(
+            f"{where}: does not say to which agents or roles its weights belong; save the team "
+            "again with this version"
+        )
     try:
         agents.load_state_dict(own | learned)
+        if isinstance(agents, FuzzyAgents) and OWNERS in kept:
+            agents.assign_rows(kept[OWNERS].tolist())
     except (KeyError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None

@@ -34,7 +34,7 @@ from ..plugins.words import expect
 from .decision_costs import join_costs, total_costs
 from .inspection import inspect_agents, record_values, recorded_values
 from .leader import build_leader, enter_scenario
-from .parts import build_parts, counts_of, load_state, state_of, weight_bytes_of
+from .parts import build_parts, counts_of, load_state, owners_in, state_of, weight_bytes_of
 
 if TYPE_CHECKING:
     from ..learners.learner import TeamSettings
@@ -370,9 +370,9 @@ class Team:
             part.warm_start(before)
 
     def save(self, path: Path | str) -> None:
-        """Write the `state_dict` to an ``.npz`` file."""
+        """Write the `state_dict` and the owners of the weights to an ``.npz`` file."""
         with open(path, "wb") as file:
-            np.savez(file, allow_pickle=False, **self.state_dict())
+            np.savez(file, allow_pickle=False, **self.state_dict(), **owners_in(self._all))
 
     def load(self, path: Path | str) -> None:
         """Continue from a file of `save`; the team must be built from the same settings.
@@ -383,7 +383,8 @@ class Team:
             If the file holds a team of another shape.
         """
         with np.load(path, allow_pickle=False) as arrays:
-            self.load_state_dict(dict(arrays))
+            owners = owners_in(self._all)
+            self.load_state_dict({name: arrays[name] for name in arrays if name not in owners})
 
     def state_dict(self) -> StateDict:
         """Return the saved state of all parts as named arrays."""

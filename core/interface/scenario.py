@@ -299,20 +299,11 @@ def check_transfer(former: Scenario, successor: Scenario, problem: str = "") -> 
         raise ValueError(f"a team trained with {there} cannot act with {here}: {problem}")
 
 
-def carried_rows(
-    former: Scenario,
-    successor: Scenario,
-    owners: Sequence[str],
-    others: Sequence[str],
-    *,
-    shared: bool,
-) -> IntArray:
+def carried_rows(owners: Sequence[str], others: Sequence[str], *, shared: bool) -> IntArray:
     """Return the former row of weights from which each row of other agents starts.
 
     Parameters
     ----------
-    former, successor
-        Scenario of trained agents, and that of the agents that start from their weights.
     owners, others
         Owner of the weights of each trained agent, and of each other agent, see `owners_of`.
     shared
@@ -326,20 +317,22 @@ def carried_rows(
     Raises
     ------
     ValueError
-        If state spaces, actions, or the owners of the weights differ; one line.
+        If the owners of the weights differ; one line.
 
     Examples
     --------
-    >>> from nested_agents.scenarios.line_up import LineUpSettings
-    >>> one, three = (LineUpSettings(carts=carts).build() for carts in (1, 3))
-    >>> carried_rows(one, three, one.roles, three.roles, shared=True).tolist()
-    [0]
+    >>> carried_rows(["left", "right"], ["right", "left", "right"], shared=True).tolist()
+    [1, 0]
     """
-    rows = list(dict.fromkeys(owners))
-    problem = ""
-    if {*rows} != {*others} and shared:
-        problem = f"their roles are {', '.join(rows)}, and {', '.join(dict.fromkeys(others))}"
-    elif {*rows} != {*others}:
-        problem = "learner.weights = 'own'; with 'role', agents of a role share theirs"
-    check_transfer(former, successor, problem)
-    return np.array([rows.index(owner) for owner in dict.fromkeys(others)])
+    rows, new_rows = list(dict.fromkeys(owners)), list(dict.fromkeys(others))
+    if {*rows} != {*new_rows} and shared:
+        raise ValueError(
+            f"learner.weights = 'role': the trained weights are those of {', '.join(rows)}; the "
+            f"roles here are {', '.join(new_rows)}"
+        )
+    if {*rows} != {*new_rows}:
+        raise ValueError(
+            f"learner.weights = 'own': the {len(rows)} agents that were trained are not the "
+            f"{len(new_rows)} agents here; with 'role', agents of a role share theirs"
+        )
+    return np.array([rows.index(owner) for owner in new_rows])

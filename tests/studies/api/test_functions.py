@@ -10,7 +10,7 @@ from nested_agents.studies.api.running import run
 from nested_agents.studies.api.study import StudyResults
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.database import SPEC_FILE
-from nested_agents.studies.trials.arrangement import arrange, check_conditions
+from nested_agents.studies.trials.arrangement import Arrangement, arrange, check_conditions
 from nested_agents.studies.trials.trial import trials_of
 
 PROGRAM = """
@@ -93,6 +93,43 @@ def test_a_part_begins_with_the_weights_of_a_kept_team(kept: Path, tmp_path: Pat
     kept.unlink()  # the study has its own copy
     again = run(tmp_path / "out" / SPEC_FILE, tmp_path / "again", jobs=1, progress=False)
     assert rows(again).equals(rows(study))
+
+
+def of_two_robots(*parts: dict) -> Arrangement:
+    box = {"kind": "box-pushing", "robots": 2}
+    learner = {"kind": "mixed", "parts": list(parts)}
+    return arrange(
+        Spec.of({**LINE_UP, "scenario": box, "learner": learner}).conditions()[0].settings, 0
+    )
+
+
+@pytest.mark.parametrize("kind", ["batch-td", "fitted-q", "td-lambda"])
+def test_weights_and_experience_of_a_kept_team_are_found_by_role(kind: str, tmp_path: Path) -> None:
+    own = {"kind": kind, "weights": "role"}
+    there = of_two_robots({"agents": "*", "learner": own})
+    list(control_loop(there.scenario, there.team, episodes=2, steps=20, seed=0))
+    path = str(tmp_path / "trained.npz")
+    there.team.save(path)
+    (trained,) = there.team.parts
+    first = {"agents": "robot1.left", "learner": {"kind": "frozen"}}
+    begun = of_two_robots(first, {"agents": "*", "learner": own, "team": path}).team.parts[1]
+    rows = {part: dict(zip(part.owners, part.rows, strict=True)) for part in (trained, begun)}
+    assert rows[trained] != rows[begun], "right wheels come first"
+    for role, row in rows[trained].items():
+        former, mine = trained.learner, begun.learner
+        assert former.theta[row].any()
+        assert (mine.theta[rows[begun][role]] == former.theta[row]).all()
+        if kind != "td-lambda":
+            assert (mine.states_of(rows[begun][role]) == former.states_of(row)).all()
+
+
+def test_a_file_that_does_not_name_roles_is_refused_if_there_are_several(tmp_path: Path) -> None:
+    part = {"agents": "*", "learner": LEARNER}
+    path = tmp_path / "trained.npz"
+    np.savez(path, **of_two_robots(part).team.state_dict())
+    with pytest.raises(ValueError, match=r"learner\.parts\[0\]\.team = .*roles") as caught:
+        of_two_robots({**part, "team": str(path)})
+    assert "\n" not in str(caught.value)
 
 
 def test_other_weights_are_another_trial(kept: Path) -> None:

@@ -156,11 +156,11 @@ def test_weights_of_a_role_decide_for_any_number_of_agents():
 REFUSED = {
     "own weights": (
         {"preset": "own-value", "learner": {}, "curriculum": STAGES},
-        r"curriculum\.two: a team trained with 1 agents .*learner\.weights = 'own'",
+        r"curriculum\.two: learner\.weights = 'own': the 1 agents .* 2 agents",
     ),
     "own weights at the end": (
         {"preset": "own-value", "learner": {}, "curriculum": STAGES[1:]},
-        r"curriculum: a team trained with 2 agents over 'line-up' cannot act with 3",
+        r"curriculum: learner\.weights = 'own': the 2 agents .* 3 agents",
     ),
     "another state space": (
         {"curriculum": [{"name": "b", "episodes": 1, "scenario": {"kind": "box-pushing"}}]},
@@ -172,7 +172,7 @@ REFUSED = {
     ),
     "an evaluation": (
         {"preset": "own-value", "learner": {}, "evaluations": {"eight": {"carts": 8}}},
-        r"evaluations\.eight: a team trained with 3 agents .* share theirs$",
+        r"evaluations\.eight: learner\.weights = 'own': the 3 agents .* share theirs$",
     ),
 }
 
