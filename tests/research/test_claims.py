@@ -354,6 +354,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "poses",
         "poses-controls",
         "poses-controls-4",
+        "poses-controls-8",
         "poses-4",
         "poses-8",
         "pendulum",

@@ -24,6 +24,7 @@ LAST = "success last 5", "evaluation success"
         ("poses", TRAINED),
         ("poses-controls", TRAINED),
         ("poses-controls-4", TRAINED),
+        ("poses-controls-8", TRAINED),
         ("poses-4", TRAINED),
         ("poses-8", TRAINED),
         ("predictors-cartpole-fine", (*LAST, "evaluation steps")),
