@@ -172,6 +172,8 @@ def _check_saved(settings: ConditionSettings) -> None:
     team = arrange(settings, 0).team
     try:
         arrays = {name: np.array(array) for name, array in team.state_dict().items()}
+        if not arrays:
+            raise TypeError("it has no arrays")
         if objects := [name for name, array in arrays.items() if array.dtype.hasobject]:
             raise TypeError(f"its array {objects[0]!r} holds objects")
         team.load_state_dict(arrays)
