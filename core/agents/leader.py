@@ -84,15 +84,16 @@ class Leader:
                 where = "scenario.leader." if str(error).startswith("learner.") else ""
                 raise ValueError(f"{where}{error}") from None
         self.enter(scenario, options)
-        self.reset()
+        self.reset(learn=True)
 
     def enter(self, scenario: Scenario, options: LeaderOptions) -> None:
         """Lead the agents of a scenario, which may be another one in every episode."""
         self._scenario = scenario
         self._options = options
 
-    def reset(self) -> None:
-        """Start an episode."""
+    def reset(self, *, learn: bool) -> None:
+        """Start an episode, of training if the leader is to `learn`."""
+        self._learns = learn and bool(self.agents)
         self._decided: tuple[Observation, IntArray, FuzzyInputs] | None = None
         self._duration = 0
         self._return = 0.0
@@ -126,9 +127,9 @@ class Leader:
             return self._options.rule()
         (agent,) = self.agents
         observation = Observation(self._options.observe()[None])
-        if self._decided is not None and explore:
+        if self._decided is not None and self._learns:
             self._learn(observation.states, terminated=False, last=False)
-        inputs = agent.observe(observation, explore=explore)
+        inputs = agent.observe(observation, explore=explore and self._learns)
         action = agent.act(inputs, INBOX)
         agent.conclude(inputs, action)
         self._decided = observation, action, inputs
@@ -139,7 +140,7 @@ class Leader:
 
         A lost task is terminal to the leader. A terminal reward repeats forever if the state does.
         """
-        if not self.agents:
+        if not self._learns:
             return
         transition = experience.transition
         discount = self.agents[0].settings.discount

@@ -87,7 +87,8 @@ def control_loop(
     learn
         Whether the team learns.
     explore
-        Whether the team explores; by default it does if it learns.
+        Whether the team explores; by default it does if it learns. A team that does not learn
+        explores only by its stochastic policies.
 
     Raises
     ------

@@ -69,6 +69,7 @@ class ManyEnvironmentsLoop:
 
     def step(self) -> list[Finished]:
         """Take one step in all environments; return the episodes that end, by environment."""
+        self._team.learns = True  # an evaluation may have been run since the last step
         decision = self._team.act(Observation(self._states), explore=True)
         transitions = self._environments.step(decision.joint_action)
         self._steps += 1

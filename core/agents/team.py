@@ -66,6 +66,8 @@ class Team:
         Whether some agents decide or learn by the scenario's predictions.
     leader
         The leader above all agents, if the scenario has options for one.
+    learns
+        Whether the episode is one of training.
     messages
         Delivery of messages.
     costs
@@ -120,6 +122,7 @@ class Team:
         actions = actions_of_left(failures, self.action_set.names, neutral)
         self._actions_of_left = partial(self.messages.actions_of_left, actions, neutral)
         self.leader = build_leader(settings, checked, seed, messages_fail=bool(failures))
+        self.learns = True
         self._all = self.parts if self.leader is None else (*self.parts, *self.leader.agents)
 
     @cached_property
@@ -211,7 +214,8 @@ class Team:
         """
         self.messages.reset(seed, episode)
         if self.leader is not None:
-            self.leader.reset()
+            self.leader.reset(learn=learn)
+        self.learns = learn
         for part in self._all:
             part.reset(episode, learn=learn)
 
@@ -225,8 +229,9 @@ class Team:
         observation
             States of all agents.
         explore
-            Whether the agents explore. If not, each takes an action of greatest value, and the
-            team changes only the random numbers that break ties.
+            Whether the agents explore; in an episode without learning, only stochastic policies
+            do. Other agents take an action of greatest value, which changes only the random
+            numbers that break ties.
         inspect
             Whether the decision contains those of single agents, see `AgentDecision`. The joint
             action is the same, but takes longer if agents would share one search.
@@ -252,8 +257,11 @@ class Team:
             if skilled is not None:
                 self.decision_costs = {measure.name: 0.0 for measure in self.costs}
                 return Decision(skilled, ())
-            explore = False
-        inputs = tuple(part.observe(observation, explore=explore) for part in self.parts)
+            explore = explore and not self.learns  # in training only the leader explores
+        inputs = tuple(
+            part.observe(observation, explore=explore and (self.learns or part.is_stochastic))
+            for part in self.parts
+        )
         inboxes: list[Inbox] | None = [] if inspect else None
         if inspect:
             record_values(self.parts, inputs)
@@ -300,19 +308,9 @@ class Team:
         return joint_action
 
     def value(self, agent: str, states: FloatArray) -> FloatArray:
-        """Return the value function of an agent at some states.
+        """Return the values ``(...)`` of an agent, by its name, at states ``(..., d)``.
 
-        Parameters
-        ----------
-        agent
-            Name of the agent.
-        states
-            ``(..., d)`` states of the agent, in the order of the scenario's state variables.
-
-        Returns
-        -------
-        FloatArray
-            ``(...)`` values.
+        States are in the order of the scenario's state variables.
 
         Raises
         ------

@@ -11,6 +11,7 @@ from nested_agents.core.interface.options import LeaderOptions
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.fitted_q import FittedQSettings
+from nested_agents.core.learners.learner import LearnerSettings
 from nested_agents.core.learners.written import WrittenSettings
 from nested_agents.core.networks.settings import PPOSettings
 from nested_agents.core.search.exploration import BurstExploration
@@ -68,10 +69,12 @@ class Road(Scenario):
         return Transition(np.full((1, 1), self.place), float(is_there) - 1.0, is_there, False, {})
 
 
-def led(learner: FittedQSettings | None, **keys: int) -> tuple[Road, Team]:
+def led(
+    learner: FittedQSettings | None, below: LearnerSettings | PPOSettings | None = None, **keys: int
+) -> tuple[Road, Team]:
     road = Road()
     road.options = RoadOptions(road, learner, **keys)
-    below = WrittenSettings(value={"place": 0.0}, decision={"rule": "random"})
+    below = below or WrittenSettings(value={"place": 0.0}, decision={"rule": "random"})
     team = Team(below, road, Hierarchy(road.agents, []), policy_seed(0))
     return road, team
 
@@ -113,6 +116,38 @@ def test_the_learner_receives_discounted_rewards_and_the_duration() -> None:
     theta = agent.learner.theta[0]
     values = [agent.rules.values(theta, np.array([[0.0, k]]))[0] for k in (0.0, 1.0)]
     assert values[1] > values[0]
+
+
+def test_a_leader_learns_from_every_option_if_it_learns_without_exploring() -> None:
+    road, team = led(LEARNER)
+    steps = list(control_loop(road, team, episodes=3, steps=20, seed=0, learn=True, explore=False))
+    state = team.leader.agents[0].learner.state_dict()
+    assert len(state["rewards"]) == len(road.options.begun)
+    assert state["durations"].sum() == len(steps)
+    assert state["rewards"].min() >= -1.9  # that of a ride
+
+
+def test_a_leader_that_does_not_learn_neither_explores_nor_stores_anything() -> None:
+    road, team = led(LEARNER)
+    list(control_loop(road, team, episodes=3, steps=20, seed=0))
+    before = {name: array.copy() for name, array in team.state_dict().items()}
+    team.leader.agents[0].explorer.choose = None  # nobody calls it
+    loop = control_loop(road, team, episodes=9, steps=20, seed=0, learn=False, explore=True)
+    assert len(list(loop)) > 9
+    after = team.state_dict()
+    for name in before.keys() - {"part0.generator", "part1.generator"}:
+        np.testing.assert_array_equal(after[name], before[name], name)
+
+
+def test_policies_below_a_leader_draw_in_an_evaluation_by_sampled_actions() -> None:
+    road, team = led(LEARNER, PPOSettings(), limit=1)
+    road.options.joint_action = lambda: None
+    drawn = {}
+    for learn, explore in ((True, True), (False, False), (False, True)):
+        state = team.parts[0].rng.bit_generator.state
+        list(control_loop(road, team, episodes=1, steps=3, seed=0, learn=learn, explore=explore))
+        drawn[learn, explore] = team.parts[0].rng.bit_generator.state != state
+    assert drawn == {(True, True): False, (False, False): False, (False, True): True}
 
 
 def test_a_led_team_is_saved_and_continues(tmp_path) -> None:

@@ -177,6 +177,31 @@ def test_slots_follow_who_is_told() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"decision": {"teammates": "empirical"}},
+        {"exploration": {"kind": "boltzmann", "max_temperature": 0.5}},
+        {"exploration": {"kind": "burst", "rate": 1.0, "decay": 1.0}},
+    ],
+)
+def test_in_an_evaluation_by_sampled_actions_only_stochastic_policies_draw(keys, world) -> None:
+    policy = {"kind": "hierarchy-ppo", "rollout": 8, "batch_size": 4}
+    settings = mixed(("cart1", policy), ("*", {**TD, **keys}))
+    team = Team(settings, world, chain_of(world.agents), policy_seed(0))
+    list(control_loop(world, team, episodes=2, steps=5, seed=0))
+    before = {name: array.copy() for name, array in team.state_dict().items()}
+    drawing, other = team.parts
+    other.explorer.choose = None  # nobody calls it
+    list(control_loop(world, team, episodes=4, steps=5, seed=0, learn=False, explore=True))
+    after = team.state_dict()
+    for name in before:
+        if not name.endswith("generator"):
+            np.testing.assert_array_equal(after[name], before[name], name)
+    drawn = f"part{team.parts.index(drawing)}.generator"
+    assert (after[drawn] != before[drawn]).any()
+
+
 def test_a_reward_of_a_terminal_state_that_does_not_absorb_is_received_once(world) -> None:
     """Its value is the reward itself, not that of receiving it for ever."""
     gamma = 0.9

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.loop import policy_seed
+from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.many_environments import ManyEnvironmentsLoop
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.failures import LeftAgents
@@ -102,6 +102,16 @@ def test_agents_see_what_they_are_told():
     assert not told[:, 0].any()
     assert (told[:, 1, :5].argmax(axis=1) == decision.joint_action[:, 0]).all()
     assert (told.sum(axis=2) == [0, 1, 2]).all()
+
+
+def test_agents_without_a_stochastic_policy_explore_again_after_an_evaluation():
+    team = team_of()
+    team.parts[0].is_stochastic = False
+    loop = loop_of(team)
+    list(control_loop(build(SPREAD), team, episodes=1, steps=2, seed=0, learn=False))
+    before = team.parts[0].rng.bit_generator.state
+    loop.step()
+    assert team.parts[0].rng.bit_generator.state != before
 
 
 @pytest.mark.parametrize("weights", ["all", "own"])
