@@ -161,10 +161,12 @@ class BatchTD(Learner):
             follower = follower_of_all[own]
             rewards = REWARD_SCALE * rewards_of_all[own]
             weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
-            low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
+            discounts = s.discount ** durations[own]
+            # Sums of rewards that repeat forever: one a decision, or one an option.
+            sums = np.append(rewards / (1.0 - s.discount), rewards / (1.0 - discounts))
             theta = self.theta[row].astype(float) * REWARD_SCALE
-            paid = rewards, follower, s.discount ** durations[own], weights
-            constants = s.discount, s.trace_decay, low, high
+            paid = rewards, follower, discounts, weights
+            constants = s.discount, s.trace_decay, sums.min(), sums.max()
             for _ in range(s.regression_iterations):
                 theta = solve(aim(values_of(theta), paid, constants, taken, strengths, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]

@@ -81,6 +81,24 @@ def test_weights_are_those_of_a_ridge_regression_for_each_action(keys: dict) -> 
     np.testing.assert_allclose(learner.theta, by_hand(rules, learner.settings, episodes), atol=1e-9)
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_targets_of_options_are_not_clipped_if_all_returns_have_one_sign(sign: float) -> None:
+    settings = FittedQSettings(discount=0.9, ridge=1e-9, regression_iterations=300)
+    _, rules = settings.rules_over(SPACE, TWO, 0)
+    learner = settings.build(rules, np.zeros(1, dtype=int))
+    learner.begin_episode()
+    for k in range(9):  # both options in both places
+        place = np.array([[float(k % 2)]])
+        paid, duration = ((0.03, 5), (0.02, 4))[k % 2]
+        learner.observe_decision(place, np.array([k // 2 % 2]), place, sign * paid, False, duration)
+    learner.end_episode()
+    first = (0.03 + 0.9**5 * 0.02) / (1 - 0.9**9)
+    second = 0.02 + 0.9**4 * first
+    known = np.array([[place, option] for place in (0.0, 1.0) for option in (0.0, 1.0)])
+    values = rules.values(learner.theta[0], known)
+    assert sign * values == pytest.approx([first, first, second, second], abs=1e-6)
+
+
 def test_an_interval_within_an_episode_changes_nothing_of_the_sums() -> None:
     rng = np.random.default_rng(1)
     lefts, acts = rng.random((9, 2, 2)), rng.integers(0, 2, (9, 2))
