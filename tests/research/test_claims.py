@@ -357,6 +357,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "poses-controls-8",
         "poses-4",
         "poses-8",
+        "poses-16",
         "pendulum",
         "cartpole",
         "spread",

@@ -27,6 +27,7 @@ LAST = "success last 5", "evaluation success"
         ("poses-controls-8", TRAINED),
         ("poses-4", TRAINED),
         ("poses-8", TRAINED),
+        ("poses-16", TRAINED),
         ("predictors-cartpole-fine", (*LAST, "evaluation steps")),
     ],
 )
