@@ -24,7 +24,7 @@ from ..errors import WIDTH, SpecError
 from ..results.analysis import Summary
 from ..results.notation import P_ADJUSTED, P_RAW, format_estimate, format_p, wrapped
 from ..results.spreadsheet import harmless
-from ..results.statistics import FEW, Estimate, exactly, plain, stack_estimates
+from ..results.statistics import FEW, exactly, is_at_end, plain, stack_estimates
 from .legend import meanings
 from .progress import count
 
@@ -202,8 +202,7 @@ class SummaryTable:
     def text(self, width: int = WIDTH) -> str:
         """Return a line of estimates for each condition, each with its 95% interval.
 
-        The number of seeds stands after the label if conditions differ in it. There are no columns
-        of p-values, because the verdicts below the table have them.
+        Labels have the number of seeds if conditions differ in it; the verdicts have p-values.
         """
         if not self.lines:
             return ""
@@ -237,7 +236,7 @@ class SummaryTable:
             f"Means over {over} with 95% intervals.",
             *wrapped(self.remark or usual),
         ]
-        if any(_is_at_end(e) for line in self.lines for e in line.estimates.values()):
+        if any(is_at_end(e) for line in self.lines for e in line.estimates.values()):
             lines.append("Means at an end of their range have Wilson intervals, scaled to it.")
         has_interval = self.cells.map(lambda text: " " in text).where(self.cells != "")
         if (has_interval.nunique() > 1).any():
@@ -301,12 +300,6 @@ class SummaryTable:
 
     def _repr_html_(self) -> str:
         return self.html
-
-
-def _is_at_end(estimate: Estimate) -> bool:
-    """Return whether a value is an end of its interval and no rate, see `bootstrap`."""
-    value, low, high = estimate
-    return bool(low < high and value in (low, high) and not 0.0 <= low < high <= 1.0)
 
 
 def _cell(line: Summary, title: str) -> str:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
-from typing import Any
 
 from ...core.plugins.words import show
 from ..presentation.progress import count
@@ -13,6 +12,7 @@ from ..results.notation import format_estimate
 from ..results.permutation_tests import LEVEL
 from ..results.recovery import RECOVERED
 from ..results.statistics import Estimate, exactly
+from ..spec.tables import SpecTable
 
 SIZES = {"robots": "robot", "carts": "cart", "joints": "joint"}
 """Keys of scenarios that give the number of bodies, and the name of one."""
@@ -96,7 +96,7 @@ def condition_sentences(table: SummaryTable, title: str, analysis: Analysis) -> 
 
 
 def methods(
-    settings: Mapping[str, Mapping[str, Any]],
+    settings: Mapping[str, SpecTable],
     extent: str,
     table: SummaryTable,
     *,
@@ -142,7 +142,7 @@ def methods(
     return sentences
 
 
-def _search(decision: Mapping[str, Any]) -> str:
+def _search(decision: SpecTable) -> str:
     """Return the evaluator of a learner, its settings and its budget as text."""
     evaluator = dict(decision["evaluator"])
     kind = evaluator.pop("kind")
@@ -152,7 +152,7 @@ def _search(decision: Mapping[str, Any]) -> str:
     return f"{kind} ({own}){limit}" if own else f"{kind}{limit}"
 
 
-def _failures(settings: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def _failures(settings: Mapping[str, SpecTable]) -> list[str]:
     """Return a sentence on failures; none without failures.
 
     Each failure has its conditions in parentheses, unless all conditions have it.
@@ -171,7 +171,7 @@ def _failures(settings: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return [f"Failures, by training episode counted from 0: {'; '.join(texts)}."]
 
 
-def _failure(own: Mapping[str, Any]) -> str:
+def _failure(own: SpecTable) -> str:
     """Return a failure as text: its kind, what fails, its settings, and its time.
 
     >>> _failure({"kind": "seized", "wheels": ["robot1.left"], "episode": 8, "end_episode": 11})
@@ -192,11 +192,11 @@ def _moment(episode: int, step: int) -> str:
     return f"step {step} of episode {episode}" if step else f"episode {episode}"
 
 
-def _kinds(tables: Iterable[Mapping[str, Any]]) -> str:
+def _kinds(tables: Iterable[SpecTable]) -> str:
     return ", ".join(_distinct(str(table["kind"]) for table in tables))
 
 
-def _body_counts(scenarios: Sequence[Mapping[str, Any]]) -> str:
+def _body_counts(scenarios: Sequence[SpecTable]) -> str:
     """Return the numbers of bodies as text, such as " with 2, 4 robots".
 
     It is that of the first key in `SIZES` that a scenario sets; empty if none does.

@@ -255,6 +255,12 @@ def rates(outcomes: ArrayLike) -> Estimate:
     return stack_estimates([rate(column[:, None]) for column in np.asarray(outcomes).T])
 
 
+def is_at_end(estimate: Estimate) -> bool:
+    """Return whether a value is an end of its interval and no rate, see `bootstrap`."""
+    value, low, high = estimate
+    return bool(low < high and value in (low, high) and not 0.0 <= low < high <= 1.0)
+
+
 def stack_estimates(estimates: Sequence[Estimate]) -> Estimate:
     """Return scalar estimates as one estimate ``(n,)``."""
     return Estimate(*np.array(estimates, dtype=float).T)

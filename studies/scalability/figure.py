@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,8 +16,8 @@ from .data import HEADINGS, Place
 
 LAW_POINTS = 60
 """Points of the line of a law."""
-LAW: dict[str, Any] = {"color": "#444444", "lw": 0.8, "alpha": 0.6}
-"""Look of the line of a law, which has the color of its hierarchy."""
+LAW_WIDTH = 0.8
+"""Width of the line of a law, which has the color of its hierarchy."""
 MAX_EFFICIENCY = 1.2
 """Efficiency that its axis always shows."""
 
@@ -51,7 +50,11 @@ def draw(report: Scalability) -> Figure:
         for axes in panels.flat:
             axes.grid(alpha=0.25)
         has_law = any(law.is_plausible for law in report.universal_laws.values())
-        others = [figures.handle("universal scalability law", **LAW)] if has_law else []
+        others = (
+            [figures.handle("universal scalability law", color="#444444", lw=LAW_WIDTH)]
+            if has_law
+            else []
+        )
         title = "means over seeds, bars: 95% intervals"
         figures.name_lines(figure, list(data.hierarchies), title, others)
     return figure
@@ -95,7 +98,7 @@ def _draw_law(axes: Axes, report: Scalability, name: str) -> None:
     measured = float(times.iloc[:, 0].mean())
     efficiency = law.throughput(factors) / factors * measured / law.time_at_smallest
     color = figures.look(report.data.hierarchies.index(name))["color"]
-    axes.plot(times.columns[0] * factors, efficiency, **{**LAW, "color": color})
+    axes.plot(times.columns[0] * factors, efficiency, color=color, lw=LAW_WIDTH)
 
 
 def _draw_front(axes: Axes, report: Scalability, cost: str) -> None:
