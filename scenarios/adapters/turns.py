@@ -20,7 +20,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import AgentSelector
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
-from ...core.hierarchy.failures import MessageFailure
+from ...core.hierarchy.failures import AbsentAgents, LeftAgents, MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
@@ -49,7 +49,8 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
     Raises
     ------
     ValueError
-        If the hierarchy has other agents, or a space is not supported.
+        If the hierarchy has other agents, a space is not supported, or agents should be absent or
+        leave.
 
     Examples
     --------
@@ -88,6 +89,12 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         common = next(iter(counts)) if len(counts) == 1 else ()
         if failures and len(common) != 1:
             raise ValueError("failures: agents have different actions, allowed: the same Discrete")
+        for k, failure in enumerate(failures):
+            if isinstance(failure, AbsentAgents | LeftAgents):
+                raise ValueError(
+                    f"failures[{k}].kind = {failure.kind!r}: agents keep their turns, allowed: "
+                    "lost, delayed, noisy"
+                )
         self._messages = Messages(hierarchy, failures, n_actions=sum(common))
         self._seed = 0
         self._episode = -1

@@ -10,6 +10,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.test import api_test, seed_test
 
 from nested_agents import environments
+from nested_agents.core.hierarchy.failures import AbsentAgents, LeftAgents
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.scenarios.adapters.turns import TurnBasedEnv
 
@@ -169,6 +170,12 @@ def test_who_has_left_passes_nothing_down() -> None:
     assert env.observe("b").tolist() == [2] + [0] * 6
     env.step(1)
     assert env.last()[:2] == (pytest.approx([2, 0, 0, 0, 1, 0, 0]), 3.0)
+
+
+@pytest.mark.parametrize("failure", [AbsentAgents(agents="a"), LeftAgents(agents="a")])
+def test_absences_are_refused_where_every_agent_has_its_turn(failure) -> None:
+    with pytest.raises(ValueError, match=r"failures\[0\]\.kind = .* allowed: lost, delayed, noisy"):
+        TurnBasedEnv(Climbing(plays=5), failures=[failure])
 
 
 def test_between_turns_of_a_step_nothing_is_to_be_learned() -> None:
