@@ -20,7 +20,7 @@ def inspect_agents(
     values: Mapping[int, FloatArray],
     inboxes: Sequence[Inbox],
 ) -> tuple[AgentDecision, ...]:
-    """Return the decision of every agent, in the order of decision.
+    """Return the decision of every agent, in the order of decision; absent agents come last.
 
     Parameters
     ----------
@@ -58,6 +58,10 @@ def inspect_agents(
                     explored=bool(own) and own[action] < greatest - tolerance,
                 )
             )
+    present = {decision.agent for decision in decisions}
+    for name, action in zip(names, joint_action.tolist(), strict=True):
+        if name not in present:
+            decisions.append(AgentDecision(name, actions[action], {}, {}, {}, False, present=False))
     return tuple(decisions)
 
 
@@ -106,6 +110,8 @@ def explain_decision(decision: Decision) -> str:
 
 
 def _explain(agent: AgentDecision) -> list[str]:
+    if not agent.present:
+        return [f"{agent.agent} is absent and decides nothing; its action is {agent.action}."]
     if not agent.values:
         reason = "."
     elif agent.explored:

@@ -289,8 +289,7 @@ class Team:
         shape = (*observation.states.shape[:-2], len(self.hierarchy))
         joint_action = np.full(shape, self.action_set.neutral)
         by_agent = joint_action.T  # a view with the axis of agents first
-        fail = bool(self.messages.failures)
-        if fail:
+        if self.messages.failures:
             left = self.messages.left
             joint_action[..., left] = self._actions_of_left()[left]
         for stage in self._stages:
@@ -303,8 +302,6 @@ class Team:
                 inboxes.append(inbox)
             by_agent[inbox.agents] = part.act(inputs[stage.part], inbox).T
             self._n_received += len(inbox.senders)
-            if fail:
-                joint_action[self.messages.absent(inbox.agents)] = self.action_set.neutral
         return joint_action
 
     def value(self, agent: str, states: FloatArray) -> FloatArray:

@@ -114,14 +114,12 @@ class Messages:
     ) -> Inbox:
         """Return the inbox of a stage, given the actions ``(..., n)`` decided so far.
 
-        Agents that have left do not decide. With `payloads`, absent agents do not decide either.
+        Agents that have left or are absent do not decide.
         """
         agents, receivers, senders = stage[1:]
         if not self.failures and payloads is None:
             return Inbox(agents, receivers, senders, joint_action[..., senders])
-        agents = agents[~self.left[agents]]
-        if payloads is not None:
-            agents = agents[~np.isin(agents, self.absent(agents))]
+        agents = agents[~(self.left | self.absent)[agents]]
         mailboxes = []
         for agent in agents.tolist():
             mailboxes.append((agent, self.received(agent, joint_action)))
@@ -149,13 +147,14 @@ class Messages:
             return senders[:0], senders[:0], senders[:0]
         return self._transmit(senders, self._past_actions, 1)
 
-    def absent(self, agents: IntArray) -> IntArray:
-        """Return those of some agents that take no part in the present decision."""
+    @property
+    def absent(self) -> BoolArray:
+        """Whether agents ``(n,)`` take no part in the present decision, unknown to the others."""
         absent: BoolArray = np.zeros(len(self.left), dtype=bool)
         for k in self._active:
             if isinstance(self.failures[k], AbsentAgents):
                 absent |= self._masks[k]
-        return agents[absent[agents]]
+        return absent
 
     def actions_of_left(self, actions: Sequence[int], neutral: int) -> IntArray:
         """Return the actions ``(n,)`` of agents that have left, by failure; others are neutral."""

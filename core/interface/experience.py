@@ -41,6 +41,8 @@ class AgentDecision:
     """Payloads received with these actions by the name of the sender, where there are any."""
     explored: bool
     """Whether another action has a greater value: the agent explored, or its policy drew."""
+    present: bool = True
+    """Whether the agent decided; an agent that is absent or has left the team does not."""
 
 
 class Decision(NamedTuple):

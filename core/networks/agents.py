@@ -22,7 +22,7 @@ from ..interface.scenario import check_transfer, owners_of
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray, set_words, words_of
 from .inputs import InputEncoder
 from .policy import InputNames, Policy, log_sum_exp
-from .rollout import PolicyShape
+from .rollout import Choices, PolicyShape
 from .settings import MultiAgentPPOSettings, PPOSettings
 
 
@@ -40,6 +40,8 @@ class PolicyInputs:
     """``(E, n, A)`` noise that is added to logits."""
     logits: FloatArray
     """``(E, n, A)``, filled in stage by stage."""
+    decided: BoolArray
+    """``(n,)`` whether an agent decided: absent agents do not."""
 
 
 class PPOAgents(Agents[PolicyInputs]):
@@ -153,7 +155,8 @@ class PPOAgents(Agents[PolicyInputs]):
         actor[..., n_told:] = own
         shape = len(own), len(self.scenario.agents), self._n_actions
         noise = self.rng.gumbel(size=shape) if explore else np.zeros(shape)
-        return PolicyInputs(states.shape[:-2], actor, joint, noise, np.zeros(shape, np.float32))
+        logits, decided = np.zeros(shape, np.float32), np.zeros(shape[1], bool)
+        return PolicyInputs(states.shape[:-2], actor, joint, noise, logits, decided)
 
     def act(self, inputs: PolicyInputs, inbox: Inbox) -> IntArray:
         """Return the actions ``(..., k)`` of a turn: sampled, or the most probable ones."""
@@ -177,6 +180,7 @@ class PPOAgents(Agents[PolicyInputs]):
     def _choose(self, inputs: PolicyInputs, inbox: Inbox) -> IntArray:
         """Return the actions of a stage, which have the greatest sum of logit and noise."""
         logits = inputs.logits[:, inbox.agents]
+        inputs.decided[inbox.agents] = True
         self.counts.joint_actions += logits.size
         chosen: IntArray = (logits + inputs.noise[:, inbox.agents]).argmax(axis=2)
         return chosen.reshape(*inputs.batch_shape, -1)
@@ -208,9 +212,8 @@ class PPOAgents(Agents[PolicyInputs]):
             rewards = np.broadcast_to(rewards.mean(axis=1, keepdims=True), rewards.shape)
         for name, policy in self.policies.items():
             rows = self._rows[name]
-            logits, actions = self._by_head(inputs.logits, joint_actions, rows)
-            own = inputs.actor[:, rows]
-            policy.append((own, inputs.joint), logits, actions, rewards[:, rows], last)
+            choices = self._by_head(inputs, joint_actions, rows)
+            policy.append((inputs.actor[:, rows], inputs.joint), choices, rewards[:, rows], last)
         truncated = last & ~steps.terminated
         if truncated.any():
             own, joint_inputs = self._encode(steps.states[truncated])
@@ -221,11 +224,11 @@ class PPOAgents(Agents[PolicyInputs]):
             for name, policy in self.policies.items():
                 policy.update(own[:, self._rows[name]], joint_inputs)
 
-    def _by_head(
-        self, logits: FloatArray, joint: IntArray, rows: IntArray
-    ) -> tuple[FloatArray, IntArray]:
-        """Return logits ``(E, k, h, A)`` and actions ``(E, k, h)`` of the rows of a policy."""
-        return logits[:, rows, None], joint[:, rows, None]
+    def _by_head(self, inputs: PolicyInputs, joint: IntArray, rows: IntArray) -> Choices:
+        """Return the choices of the rows of a policy."""
+        return Choices(
+            inputs.logits[:, rows, None], joint[:, rows, None], inputs.decided[rows, None]
+        )
 
     def _transfer_problem(self, former: Self) -> str:
         """Return why other agents' policies cannot be used here, or nothing."""
@@ -304,11 +307,12 @@ class CentralPPOAgents(PPOAgents):
         """Return the actions ``(..., k)`` of the agents of a stage."""
         return self._choose(inputs, inbox)
 
-    def _by_head(
-        self, logits: FloatArray, joint: IntArray, rows: IntArray
-    ) -> tuple[FloatArray, IntArray]:
-        """Return logits ``(E, 1, h, A)`` and actions ``(E, 1, h)``."""
-        return logits[:, None, self.members], joint[:, None, self.members]
+    def _by_head(self, inputs: PolicyInputs, joint: IntArray, rows: IntArray) -> Choices:
+        """Return the choices of the only row, with a head for each member."""
+        heads = self.members
+        return Choices(
+            inputs.logits[:, None, heads], joint[:, None, heads], inputs.decided[None, heads]
+        )
 
     def _transfer_problem(self, former: Self) -> str:
         is_same = tuple(former.scenario.agents) == tuple(self.scenario.agents)

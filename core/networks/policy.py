@@ -17,9 +17,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..interface.agents import StateDict, add_prefix, select_prefix
-from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
+from ..numerics import AnyArray, BoolArray, FloatArray
 from .mlp import MLP, Adam, RunningMoments
-from .rollout import Batch, PolicyShape, Rollout, generalized_advantages
+from .rollout import Batch, Choices, PolicyShape, Rollout, generalized_advantages
 from .settings import NetworkSettings
 
 MAX_GRAD_NORM = 0.5
@@ -89,7 +89,7 @@ class Policy:
         return inputs.reshape(-1, inputs.shape[-1])
 
     def append(
-        self, inputs: tuple[FloatArray, FloatArray], logits: FloatArray, actions: IntArray,
+        self, inputs: tuple[FloatArray, FloatArray], choices: Choices,
         rewards: FloatArray, last: BoolArray,
     ) -> None:  # fmt: skip
         """Append a step of all environments to the rollout.
@@ -98,8 +98,8 @@ class Policy:
         ----------
         inputs
             Inputs of the actor ``(E, k, n_told + n_own)``, and of all agents ``(E, n_joint)``.
-        logits, actions
-            ``(E, k, h, A)`` and ``(E, k, h)``.
+        choices
+            Logits, actions, and who decided.
         rewards
             ``(E, k)``.
         last
@@ -117,10 +117,12 @@ class Policy:
             )
         rollout = self.rollout
         t = rollout.steps
+        logits, actions, decided = choices
         chosen = np.take_along_axis(logits, actions[..., None], axis=-1)[..., 0]
         rollout.actor_inputs[t], rollout.joint_inputs[t] = inputs
         rollout.actions[t] = actions
-        rollout.log_probs[t] = (chosen - log_sum_exp(logits)).sum(axis=-1)
+        rollout.decided[t] = decided
+        rollout.log_probs[t] = ((chosen - log_sum_exp(logits)) * decided).sum(axis=-1)
         rollout.last[t] = last
         rollout.rewards[t] = self._normalize(rewards, last)
         rollout.steps += 1
@@ -170,7 +172,10 @@ class Policy:
         self.rollout.steps = 0
 
     def _batch(self, next_values: FloatArray) -> Batch:
-        """Return all transitions of the rollout, given the values ``(E, k)`` after it."""
+        """Return the transitions of the rollout that were decided.
+
+        Values after the rollout are ``(E, k)``.
+        """
         rollout = self.rollout
         critic_inputs = self._critic_inputs(
             rollout.actor_inputs[..., self.shape.n_told :], rollout.joint_inputs
@@ -179,14 +184,16 @@ class Policy:
         advantages = generalized_advantages(
             rollout.rewards, values, next_values, rollout.last, self.settings
         )
-        return Batch(
+        batch = Batch(
             actor_inputs=rollout.actor_inputs.reshape(-1, rollout.actor_inputs.shape[-1]),
             critic_inputs=critic_inputs,
             actions=rollout.actions.reshape(-1, self.shape.n_heads),
+            decided=rollout.decided.reshape(-1, self.shape.n_heads),
             log_probs=rollout.log_probs.ravel(),
             advantages=advantages.ravel().astype(np.float32),
             returns=(advantages + values).ravel().astype(np.float32),
         )
+        return batch.take(np.flatnonzero(batch.decided.any(axis=1)))
 
     def loss_and_grad(self, batch: Batch, entropy: float) -> float:
         """Return the loss of a minibatch and write its gradient to `gradient`.
@@ -208,16 +215,17 @@ class Policy:
         logits = activations[-1].reshape(-1, self.shape.n_heads, self.shape.n_actions)
         log_probs = logits - log_sum_exp(logits)[..., None]
         probs = np.exp(log_probs)
-        chosen = np.take_along_axis(log_probs, batch.actions[..., None], axis=-1)
-        ratio = np.exp(chosen.sum(axis=(1, 2)) - batch.log_probs)
+        chosen = np.take_along_axis(log_probs, batch.actions[..., None], axis=-1)[..., 0]
+        ratio = np.exp((chosen * batch.decided).sum(axis=1) - batch.log_probs)
         is_clipped = np.where(a > 0, ratio > 1 + clip, ratio < 1 - clip)
         gain = (np.where(is_clipped, np.float32(0), ratio * a) / m)[:, None, None]
-        entropies = -(probs * log_probs).sum(axis=-1)
+        entropies = -(probs * log_probs).sum(axis=-1) * batch.decided
         gradient = probs * (gain + bonus * entropies[..., None]) + bonus * probs * log_probs
         by_choice = gradient.reshape(-1, self.shape.n_actions)
         by_choice[np.arange(len(by_choice)), batch.actions.ravel()] -= gain.repeat(
             self.shape.n_heads
         )
+        gradient *= batch.decided[..., None]
         self.actor.backward(activations, gradient.reshape(len(gradient), -1))
         activations = self.critic.forward(batch.critic_inputs)
         errors = activations[-1][:, 0] - batch.returns

@@ -27,6 +27,17 @@ class PolicyShape(NamedTuple):
     """Choices of a head."""
 
 
+class Choices(NamedTuple):
+    """Choices of a step by the heads of all agents."""
+
+    logits: FloatArray
+    """``(E, k, h, A)``."""
+    actions: IntArray
+    """``(E, k, h)``."""
+    decided: BoolArray
+    """``(k, h)`` whether a policy chose the action: an absent agent does not decide."""
+
+
 class Batch(NamedTuple):
     """Transitions of a rollout, or of a minibatch."""
 
@@ -36,6 +47,8 @@ class Batch(NamedTuple):
     """``(m, n_own + n_joint)``."""
     actions: IntArray
     """``(m, h)``."""
+    decided: BoolArray
+    """``(m, h)`` whether the policy chose an action; each transition has one that it chose."""
     log_probs: FloatArray
     """``(m,)`` log probabilities of the actions when they were sampled."""
     advantages: FloatArray
@@ -67,6 +80,7 @@ class Rollout:
         self.actor_inputs = np.zeros((*axes, shape.n_told + shape.n_own), np.float32)
         self.joint_inputs = np.zeros((size, n_environments, shape.n_joint), np.float32)
         self.actions = np.zeros((*axes, shape.n_heads), np.int64)
+        self.decided = np.zeros((*axes, shape.n_heads), bool)
         self.log_probs = np.zeros(axes, np.float32)
         self.rewards = np.zeros(axes, np.float32)
         self.last = np.zeros((size, n_environments), bool)

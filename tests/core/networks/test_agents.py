@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from acting import look
 
+import nested_agents as na
 from nested_agents.core.agents.team import Team
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.hierarchy.messages import Messages
@@ -214,14 +215,27 @@ def test_what_is_told_is_what_arrives(failure: str, edges: Any) -> None:
     rng = np.random.default_rng(0)
     for _ in range(8):
         joint = rng.integers(n_actions, size=3)
-        joint[messages.absent(np.arange(3))] = 0
+        joint[messages.absent] = 0
         arriving = np.zeros((3, 2, n_actions))
-        for agent in hierarchy.order:
+        for agent in np.array(hierarchy.order)[~messages.absent[list(hierarchy.order)]]:
             senders, actions, _ = messages.received(agent, joint)
             arriving[agent, senders, actions] = 1.0
         messages.advance(joint)
         assert len(agents.told_names) == 2 * n_actions, "of a and b, who decide before another"
         assert (told_of(team, joint) == arriving.reshape(3, -1)).all()
+
+
+@pytest.mark.parametrize("kind", ["absent", "left"])
+def test_agents_that_do_not_decide_are_not_learned_from(kind: str) -> None:
+    """From the fourth decision on, b is away; all share one policy."""
+    failures = failures_of({"kind": kind, "agents": "b", "episode": 0, "step": 3})
+    team, agents = team_of(Players("abc", 3), Hierarchy("abc", TWO), failures)
+    team.reset(0, 0, learn=True)
+    sequence(agents.scenario, team, 5)
+    decided = agents.policies["all"].rollout.decided[:5, 0, :, 0]
+    assert decided.tolist() == [[True] * 3] * 3 + [[True, False, True]] * 2
+    told = na.explain_decision(team.act(look(agents.scenario), inspect=True))
+    assert told.splitlines()[-1] == "b is absent and decides nothing; its action is u."
 
 
 def echoing(agents: Any, untold: int) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.networks.policy import Policy, linear_decay
-from nested_agents.core.networks.rollout import Batch, PolicyShape, generalized_advantages
+from nested_agents.core.networks.rollout import Batch, Choices, PolicyShape, generalized_advantages
 from nested_agents.core.networks.settings import HierarchyPPOSettings
 
 SHAPE = PolicyShape(n_told=2, n_own=4, n_joint=3, n_heads=1, n_actions=5)
@@ -26,12 +26,20 @@ def double(policy):
     policy.critic.bind_storage(policy.weights[split:], policy.gradient[split:])
 
 
+def decided_of(rng, m, n_heads):
+    """Return which heads decided, at least one of each transition."""
+    decided = rng.random((m, n_heads)) < 0.7
+    decided[:, 0] |= ~decided.any(axis=1)
+    return decided
+
+
 def batch_of(shape, m=40):
     rng = np.random.default_rng(2)
     return Batch(
         actor_inputs=rng.normal(size=(m, shape.n_told + shape.n_own)),
         critic_inputs=rng.normal(size=(m, shape.n_own + shape.n_joint)),
         actions=rng.integers(0, shape.n_actions, (m, shape.n_heads)),
+        decided=decided_of(rng, m, shape.n_heads),
         log_probs=np.log(rng.uniform(0.1, 0.4, (m, shape.n_heads))).sum(axis=1),
         advantages=rng.normal(size=m),
         returns=rng.normal(size=m),
@@ -60,7 +68,7 @@ def test_the_loss_by_hand():
     policy.weights[:] = 0.0
     m = 2
     batch = Batch(
-        np.ones((m, 6)), np.ones((m, 7)), np.array([[0], [1]]),
+        np.ones((m, 6)), np.ones((m, 7)), np.array([[0], [1]]), np.ones((m, 1), bool),
         np.log([0.5 / 1.5, 0.5 / 0.9]), np.array([1.0, -1.0]), np.array([2.0, 0.0]),
     )  # fmt: skip
     # Ratios of 1.5, which is clipped to 1.2, and of .9; squared errors of 4 and 0.
@@ -76,7 +84,8 @@ def test_heads_are_independent_choices():
     actions = np.array([[0, 1], [2, 2], [4, 0]])
     policy = policy_of(TWO_HEADS, n_agents=3)
     inputs = np.zeros((1, 3, 6)), np.zeros((1, 3))
-    policy.append(inputs, logits[None], actions[None], np.zeros((1, 3)), np.array([False]))
+    choices = Choices(logits[None], actions[None], np.ones((3, 2), bool))
+    policy.append(inputs, choices, np.zeros((1, 3)), np.array([False]))
     probs = np.exp(logits) / np.exp(logits).sum(axis=2, keepdims=True)
     joint = [probs[k, 0, a] * probs[k, 1, b] for k, (a, b) in enumerate(actions)]
     assert policy.rollout.log_probs[0, 0] == pytest.approx(np.log(joint), abs=1e-5)
@@ -105,7 +114,8 @@ def append(policy, rewards, last):
     k = len(rewards)
     inputs = np.zeros((1, k, 6)), np.zeros((1, 3))
     logits, actions = np.zeros((1, k, 1, 5)), np.zeros((1, k, 1), int)
-    policy.append(inputs, logits, actions, np.array([rewards]), np.array([last]))
+    choices = Choices(logits, actions, np.ones((2, 1), bool))
+    policy.append(inputs, choices, np.array([rewards]), np.array([last]))
 
 
 def test_rewards_are_divided_by_the_deviation_of_discounted_returns():
@@ -127,6 +137,29 @@ def test_a_truncated_episode_continues_by_its_value():
     value = policy.values(own, joint)[0]
     assert value.all()
     assert policy.rollout.rewards[0, 0] == pytest.approx(rewards + 0.5 * value)
+
+
+def test_what_was_not_decided_is_not_learned():
+    """The second agent did not decide, nor the second head of the third."""
+    policy = policy_of(TWO_HEADS, n_agents=3, rollout=2)
+    rng = np.random.default_rng(0)
+    decided = np.array([[1, 1], [0, 0], [1, 0]], dtype=bool)
+    gradients = []
+    for action in (1, 4):
+        actions = np.array([[[1, 1], [action, action], [1, action]]])
+        choices = Choices(np.zeros((1, 3, 2, 5)), actions, decided)
+        inputs = rng.normal(size=(1, 3, 6)), np.ones((1, 3))
+        inputs[0][0, [0, 2]] = [[1.0], [-1.0]]
+        for _ in range(2):
+            policy.append(inputs, choices, np.zeros((1, 3)), np.array([False]))
+        batch = policy._batch(np.zeros((1, 3)))
+        assert len(batch.actions) == 4
+        batch = batch._replace(advantages=np.array([1.0, -1.0, 0.5, 0.5]))
+        policy.loss_and_grad(batch, 0.0)
+        gradients.append(policy.gradient.copy())
+        policy.rollout.steps = 0
+    assert (gradients[0] == gradients[1]).all()
+    assert gradients[0].any()
 
 
 def test_decay():
