@@ -21,10 +21,10 @@ from ...scenarios.faults.wrappers import ActuatorFault, FaultyEnv, FaultyParalle
 from ...scenarios.library_types import Data, Environment
 from ..presentation.reports import Report
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.analysis import Summary
+from ..results.analysis import Summary, has_lower_bounds
 from ..results.notation import wrapped
 from ..results.recovery import BLOCK, LOWER_BOUND, REGAINED, recovery
-from ..results.statistics import bootstrap, exactly, rate
+from ..results.statistics import bootstrap, censored, exactly, rate
 
 Policy: TypeAlias = Any
 """Policy: a function that returns the action for an observation, or for observations by agent; or a
@@ -86,19 +86,22 @@ class FaultCourse(NamedTuple):
         recovered, episodes = self.recovery()
         k = self.onset
         blocks = {
-            "before": self.faulty[:, k - BLOCK : k],
-            "just after": self.faulty[:, k : k + BLOCK],
+            "return before": self.faulty[:, k - BLOCK : k],
+            "return just after": self.faulty[:, k : k + BLOCK],
         }
         if self.end is not None:
-            blocks["after its end"] = self.faulty[:, self.end : self.end + BLOCK]
-        blocks |= {"end": self.faulty[:, -BLOCK:], "end, no fault": self.healthy[:, -BLOCK:]}
+            blocks["return after its end"] = self.faulty[:, self.end : self.end + BLOCK]
+        ends = {"": self.faulty, ", no fault": self.healthy}
+        blocks |= {f"return at the end{what}": own[:, -BLOCK:] for what, own in ends.items()}
         estimates = {title: bootstrap(block.mean(axis=1)) for title, block in blocks.items()}
         if self.end is not None:
             estimates["fault ends [episode]"] = exactly(self.end)
         estimates |= {
             "cumulative loss": bootstrap(self.shortfall.sum(axis=1)),
             "recovered": rate(recovered[:, None]),
-            "recovery time": bootstrap(episodes, bounds=(0.0, self.shortfall.shape[1])),
+            "recovery time": censored(
+                bootstrap(episodes, bounds=(0.0, self.shortfall.shape[1])), recovered == 0.0
+            ),
         }
         return Summary(self.name, len(self.faulty), estimates)
 
@@ -118,8 +121,8 @@ class RecoveryTable(Report):
     @property
     def notes(self) -> tuple[str, ...]:
         """Meaning of the columns."""
-        levels = f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes."
-        return (levels, *wrapped(LOWER_BOUND))
+        levels = f"Returns are means of {BLOCK} episodes; recovery time is in episodes."
+        return (levels, *(wrapped(LOWER_BOUND) if has_lower_bounds(self.table.lines) else ()))
 
 
 def recovery_table(

@@ -21,7 +21,7 @@ from ...core.numerics import pd
 from ...core.plugins.printing import printable
 from ...core.plugins.words import expect_each, near
 from ..errors import WIDTH, SpecError
-from ..results.analysis import Summary
+from ..results.analysis import Summary, has_lower_bounds
 from ..results.notation import P_ADJUSTED, P_RAW, format_estimate, format_p, wrapped
 from ..results.spreadsheet import harmless
 from ..results.statistics import FEW, exactly, is_at_end, plain, stack_estimates
@@ -172,7 +172,8 @@ def rows_of(frame: pd.DataFrame) -> Iterator[tuple[object, ...]]:
     yield from frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None)
 
 
-MATHS_SPACE = r"\;"
+GREATER, SPACED = r"\\ge", r"\\;["
+"""Parts of estimates in LaTeX."""
 MARKUP = re.compile(r"[\\`*<|$~]|&(?=#?\w+;)|\](?=[(\[])|\b_|_\b")
 """Characters that Markdown does not show as they are."""
 UNKNOWN = exactly(np.nan)
@@ -238,7 +239,10 @@ class SummaryTable:
         ]
         if any(is_at_end(e) for line in self.lines for e in line.estimates.values()):
             lines.append("Means at an end of their range have Wilson intervals, scaled to it.")
-        has_interval = self.cells.map(lambda text: " " in text).where(self.cells != "")
+        if has_lower_bounds(self.lines):
+            lines.append("Lower bounds (>=): some values are only known to be larger.")
+        is_estimate = (self.cells != "") & ~self.cells.map(lambda text: text.startswith(">="))
+        has_interval = self.cells.map(lambda text: "[" in text).where(is_estimate)
         if (has_interval.nunique() > 1).any():
             lines.append("Without an interval: one seed has the value, or all seeds have the same.")
         return lines
@@ -290,9 +294,8 @@ class SummaryTable:
     @property
     def latex(self) -> str:
         """The whole table in LaTeX."""
-        cells = self.cells.map(
-            lambda text: f"${text.replace(' ', MATHS_SPACE, 1)}$" if text else "--"
-        )
+        maths = self.cells.replace({">= ": GREATER, r" \[": SPACED}, regex=True)
+        cells = maths.map(lambda text: f"${text}$" if text else "--")
         cells.insert(0, "condition", [line.condition for line in self.lines])
         cells.insert(1, "seeds", [line.seeds for line in self.lines])
         note = "; 95% intervals in brackets"
@@ -394,7 +397,7 @@ def _in_one_line(text: str) -> str:
 
 def _aligned(cells: Sequence[str]) -> list[str]:
     """Return cells in which values end, and intervals begin, at one place."""
-    parts = [cell.partition(" ") for cell in cells]
+    parts = [cell.partition(" [") for cell in cells]
     value = max(len(value) for value, *_ in parts)
     interval = max(len(interval) for *_, interval in parts)
-    return [f"{v:>{value}} {i:<{interval}}" for v, _, i in parts]
+    return [f"{v:>{value}}{mark:<2}{i:<{interval}}" for v, mark, i in parts]

@@ -25,11 +25,13 @@ MAX_NAMED = 3
 def main_title(table: SummaryTable) -> str:
     """Return the heading of the success rate, or of the return where no success is defined.
 
-    Evaluation precedes training. The result is empty if the table has neither.
+    It is that of the evaluation or of the end of training, if the table has it; empty if the table
+    has none.
     """
     titles = [title for title in table.titles if "difference" not in title]
     rates = [t for t in titles if "success" in t] or [t for t in titles if "return" in t]
-    return next((title for title in rates if "evaluation" in title), rates[0] if rates else "")
+    most = (title for title in rates if "evaluation" in title or "at the end" in title)
+    return next(most, rates[0] if rates else "")
 
 
 def verdict(table: SummaryTable, title: str, analysis: Analysis) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from .notation import listed, wrapped
 from .permutation_tests import LEVEL
 from .power_text import independent_power_lines, power_lines
 from .results import STEPS, Results, row_means
-from .statistics import NOT_NEGATIVE, Array, Estimate, bootstrap, rate
+from .statistics import NOT_NEGATIVE, Array, Estimate, LowerBound, bootstrap, rate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,6 +35,11 @@ class Summary(NamedTuple):
     """Number of seeds that have finished."""
     estimates: dict[str, Estimate]
     """Scalar estimates by title."""
+
+
+def has_lower_bounds(lines: Iterable[Summary]) -> bool:
+    """Return whether an estimate is only a lower bound."""
+    return any(isinstance(e, LowerBound) for line in lines for e in line.estimates.values())
 
 
 def evaluated(results: Results, condition: str) -> dict[str, Estimate]:

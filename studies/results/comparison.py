@@ -13,7 +13,15 @@ from ...core.numerics import pd
 from ...core.plugins.words import closest
 from ..errors import SpecError
 from ..spec.tables import SpecTable, aliases, key_named, label, named
-from .analysis import NOTHING, UNPAIRED, Summary, identity_lines, mean_estimate, verdicts
+from .analysis import (
+    NOTHING,
+    UNPAIRED,
+    Summary,
+    has_lower_bounds,
+    identity_lines,
+    mean_estimate,
+    verdicts,
+)
 from .differences import (
     MIN_RUNS,
     BySeed,
@@ -26,12 +34,13 @@ from .differences import (
 from .measured import default_measure, title_of, values_by_seed, values_of
 from .notation import P_ADJUSTED, P_RAW, listed, wrapped
 from .power_text import power_lines
-from .recovery import DECISIONS, LOWER_BOUND, RECOVERY, TIME, within
+from .recovery import LOWER_BOUND, RECOVERY, never_recovered, within
 from .results import STEPS, Results, row_means
-from .statistics import Array, Estimate, exactly
+from .statistics import Array, Estimate, censored, exactly
 
 DIFFERENCE_TITLES = {True: "difference", False: "difference (independent samples)"}
 """Headings of the column of differences, of paired and of independent runs."""
+LIMITED_TIMES = "Differences and p are of times that end with training."
 Members = dict[str, str]
 """Labels of the conditions of a group by their names within it."""
 
@@ -89,8 +98,8 @@ class ComparisonTable(NamedTuple):
         lines += listed(UNPAIRED, (text for group in self.groups for text in group.left_out))
         if self.measure.name in RECOVERY:
             lines += self._without_success()
-        if self.measure.name in (TIME.name, DECISIONS.name):
-            lines += wrapped(LOWER_BOUND)
+        if has_lower_bounds(self.table):
+            lines += wrapped(f"{LOWER_BOUND} {LIMITED_TIMES}")
         if self.measure.gathering == "sum" and self.measure.better == "lower":
             lines += wrapped(f"{self.title}: a sum, which is lower in episodes that end early.")
         compared = {c for group in self.groups for c in group.members.values()}
@@ -141,7 +150,8 @@ def compare_conditions(
     SpecError
         If the results have no such measure, phase, key or reference, or nothing can be a success.
     """
-    shown, values, phase = values_by_seed(results, measure, phase)
+    asked = phase
+    shown, values, phase = values_by_seed(results, measure, asked)
     if shown.is_rate and shown.greatest == 0.0:
         others = [m.name for m in results.measures if m != shown]
         raise SpecError(
@@ -157,8 +167,13 @@ def compare_conditions(
             for n in others
         ]
     compared = differences(pairs, shown)
+    bounds = never_recovered(results, shown, asked)
+    means = {
+        c: censored(mean_estimate(within(results, c, shown), own), c in bounds)
+        for c, own in values.items()
+    }
     compared_groups = [
-        _group(results, setting, members, values, compared[setting], (shown, phase))
+        _group(results, setting, members, (values, means), compared[setting], (shown, phase))
         for setting, members in groups.items()
     ]
     return ComparisonTable(shown, phase, tuple(compared_groups), results)
@@ -168,12 +183,13 @@ def _group(
     results: Results,
     setting: str,
     members: Members,
-    values: Mapping[str, pd.DataFrame],
+    measured: tuple[Mapping[str, pd.DataFrame], Mapping[str, Estimate]],
     compared: tuple[Difference, ...],
-    measured: tuple[Measure, str],
+    measure_in_phase: tuple[Measure, str],
 ) -> ComparisonGroup:
     """Return the group of some conditions, the reference first."""
-    measure, phase = measured
+    values, means = measured
+    measure, phase = measure_in_phase
     by_name = {d.condition: d for d in compared}
     reference = next(iter(members))
     lines = []
@@ -181,8 +197,7 @@ def _group(
     for name, condition in members.items():
         title = ", ".join(filter(None, (setting, name)))
         own = values[condition]
-        shown = within(results, condition, measure)
-        estimates = {title_of(measure, phase): mean_estimate(shown, own)}
+        estimates = {title_of(measure, phase): means[condition]}
         if name in by_name:
             estimates |= _difference_columns(by_name[name], measure)
             count = _left_out(results, own, values[members[reference]], paired=by_name[name].paired)

@@ -12,7 +12,7 @@ from ...core.plugins.words import closest, near
 from ..errors import SpecError
 from .differences import BySeed
 from .notation import MIN_LARGEST
-from .recovery import RECOVERED, RECOVERY, recovery_by_seed
+from .recovery import LOSS, RECOVERED, RECOVERY, never_recovered, recovery_by_seed
 from .results import SECONDS, STEPS, Results, describe_number, row_means
 from .scores import LAST_STEP
 
@@ -70,9 +70,20 @@ def _has_failed(results: Results) -> bool:
 def values_of(
     results: Results, name: str, phase: str | None = None
 ) -> tuple[Measure, dict[str, BySeed], str]:
-    """Return a measure, its means by condition and seed, and their phase."""
-    measure, values, phase = values_by_seed(results, name, phase)
-    return measure, {condition: row_means(own) for condition, own in values.items()}, phase
+    """Return a measure, its means by condition and seed, and their phase.
+
+    Raises
+    ------
+    SpecError
+        As `values_by_seed`, and if a seed never recovers, whose time to recovery is unknown.
+    """
+    measure, values, own_phase = values_by_seed(results, name, phase)
+    if bounds := never_recovered(results, measure, phase):
+        raise SpecError(
+            f"measure = {name!r}: unknown where a seed never recovers, as of {min(bounds)!r}; "
+            f"allowed: {RECOVERED.name}, {LOSS.name}"
+        )
+    return measure, {condition: row_means(own) for condition, own in values.items()}, own_phase
 
 
 def values_by_seed(

@@ -10,7 +10,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 from textwrap import wrap
 
 from ..errors import WIDTH
-from .statistics import Estimate
+from .statistics import Estimate, LowerBound
 
 P_ADJUSTED, P_RAW = "p", "p unadjusted"
 """Headings of columns of p-values."""
@@ -53,16 +53,20 @@ def format_estimate(estimate: Estimate, *, signed: bool = False) -> str:
 
     There are as many decimals, at most two, as give both the value and the width of the interval
     two significant figures. Bounds are rounded outward, so the interval shown contains the exact
-    one.
+    one. A lower bound has no interval.
 
     Examples
     --------
+    >>> format_estimate(LowerBound(8.0, 5.4, math.inf))
+    '>= 8'
     >>> format_estimate(Estimate(0.82, 0.551, 0.949))
     '0.82 [0.55, 0.95]'
     >>> format_estimate(Estimate(97.6, 78.2, 113.7)), format_estimate(Estimate(1.04, 0.96, 1.131))
     ('98 [78, 114]', '1.04 [0.96, 1.14]')
     """
     value, low, high = map(float, estimate)
+    if isinstance(estimate, LowerBound):
+        return f">= {format_number(value)}"
     if math.isnan(low):
         return format_number(value, signed=signed)
     decimals = _decimals(value, low, high)
@@ -117,7 +121,7 @@ def _fixed(
     return f"{mantissa}e{int(power)}"
 
 
-WHOLE = re.compile(r"[-+]?\d\S* \[[^]]*\]|\(\S+ unadjusted\)|\w+ [=<] \S+|\d+ seeds?|last \d+")
+WHOLE = re.compile(r"[-+]?\d\S* \[[^]]*\]|\(\S+ unadjusted\)|(\w+ [=<]|>=) \S+|\d+ seeds?|last \d+")
 """Text that is not broken: an estimate with its interval, ``p = 0.03``, a count of seeds."""
 
 

@@ -28,11 +28,12 @@ TIME = Measure("recovery_time", "recovery time", "episodes", better="lower", lea
 DECISIONS = Measure("recovery_decisions", "decisions to recovery", better="lower", least=0.0)
 RECOVERY = {measure.name: measure for measure in (RECOVERED, LOSS, TIME, DECISIONS)}
 """Measures of a trial with a failure, by name."""
+TIMES = (TIME.name, DECISIONS.name)
 LOWER_BOUND = (
-    "A seed that never recovers counts with all its episodes from the failure on: mean recovery "
-    "times are lower bounds."
+    "A seed that never recovers counts with all its episodes from the failure on, so that the mean "
+    "time to recovery is a lower bound."
 )
-"""Remark on the means of `TIME` and `DECISIONS`."""
+"""Remark on the means of `TIMES`."""
 
 
 def is_over_episodes(measure: Measure) -> bool:
@@ -151,6 +152,14 @@ def within(results: Results, condition: str, measure: Measure) -> Measure:
     course = failure_course(results, condition)
     own = bounded(measure.name, [course], results.step_limits[0])
     return replace(own, title=measure.title)
+
+
+def never_recovered(results: Results, measure: Measure, phase: str | None) -> set[str]:
+    """Return the conditions of which the mean is a lower bound, because a seed never recovers."""
+    if measure.name not in TIMES:
+        return set()
+    _, recovered = recovery_by_seed(results, RECOVERED.name, phase or "training")
+    return {condition for condition, own in recovered.items() if not own.all()}
 
 
 def recovery_by_seed(

@@ -52,6 +52,21 @@ class Estimate(NamedTuple):
     high: Array
 
 
+class LowerBound(Estimate):
+    """Mean of values of which some are only known to be larger; it has no upper end."""
+
+
+def censored(mean: Estimate, is_censored: ArrayLike) -> Estimate:
+    """Return the mean of values, as a lower bound if some of them are only known to be larger.
+
+    Examples
+    --------
+    >>> type(censored(bootstrap([2.0, 8.0]), [False, True])).__name__
+    'LowerBound'
+    """
+    return LowerBound(mean.value, mean.low, np.inf) if np.any(is_censored) else mean
+
+
 def exactly(value: ArrayLike) -> Estimate:
     """Return values without an interval, such as counts."""
     unknown = np.full(np.shape(value), np.nan)

@@ -25,7 +25,7 @@ REACHED = ("success last 5", "evaluation success")
             "thousand-arms",
             ("evaluation success", *(f"success, {n}" for n in ("128", "256", "512", "1,024"))),
         ),
-        ("locked-joint", ("before", "just after", "success at the end")),
+        ("locked-joint", ("success before", "success just after", "success at the end")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,19 +26,27 @@ from ....core.learners.td import FrozenSettings
 from ....core.numerics import pd
 from ....core.plugins.settings import FailureSpan
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures, Summary, judged, mean_estimate
+from ...results.analysis import (
+    Analysis,
+    Figures,
+    Summary,
+    has_lower_bounds,
+    judged,
+    mean_estimate,
+)
 from ...results.differences import Pair
 from ...results.notation import wrapped
 from ...results.recovery import (
     BLOCK,
     LOWER_BOUND,
     RECOVERED,
+    TIMES,
     FailureCourse,
     bounded,
     failure_course,
 )
 from ...results.results import KEPT, Results
-from ...results.statistics import Array, Estimate, exactly, rate, stack_estimates
+from ...results.statistics import Array, Estimate, censored, exactly, rate, stack_estimates
 from ...spec.spec import Spec
 from ...spec.tables import SpecTable, label_but
 from ...trials.arrangement import arrange
@@ -168,19 +176,21 @@ class Course(NamedTuple):
         """Row of the table."""
         course = self.measured
         estimates = {
-            "before": rate(course.before),
-            "just after": rate(course.from_episode(course.onset)),
+            "success before": rate(course.before),
+            "success just after": rate(course.from_episode(course.onset)),
         }
         if self.end is not None:
             estimates["failure ends [episode]"] = exactly(self.end)
             if self.end <= course.success.shape[1] - BLOCK:
-                estimates["after its end"] = rate(course.from_episode(self.end))
+                estimates["success after its end"] = rate(course.from_episode(self.end))
         estimates[AT_END] = rate(course.end)
         if course.had_success.any():
-            for name, values in course.measured.items():
+            measured = {n: own[course.had_success] for n, own in course.measured.items()}
+            for name, values in measured.items():
                 measure = bounded(name, [course], self.longest)
-                known = values[course.had_success]
-                estimates[measure.heading] = mean_estimate(measure, pd.DataFrame(known))
+                mean = mean_estimate(measure, pd.DataFrame(values))
+                is_censored = name in TIMES and measured[RECOVERED.name] == 0.0
+                estimates[measure.heading] = censored(mean, is_censored)
         return Summary(f"{self.fault}: {self.adapts}", len(course.success), estimates)
 
 
@@ -205,11 +215,11 @@ def analyse(results: Results) -> Analysis:
         lines += more
     if not all(course.measured.had_success.all() for course in courses):
         notes += _unmeasured(courses)
-    if any(course.measured.had_success.any() for course in courses):
-        notes += wrapped(LOWER_BOUND)
     if any(course.end is not None for course in courses):
         notes.append("Recovery after the end of a failure is not adaptation.")
     table = tuple(course.summary for course in courses)
+    if has_lower_bounds(table):
+        notes += wrapped(LOWER_BOUND)
     return Analysis(table, (*notes, *lines), courses, differences)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from nested_agents import faults
+from nested_agents.analysis import format_estimate
 from nested_agents.environments import parallel
 from nested_agents.scenarios.environments import AgentsEnv
 from nested_agents.studies.api.recovery import BLOCK, FaultCourse, returns
@@ -23,16 +24,16 @@ def test_numbers_by_hand() -> None:
     assert episodes.tolist() == [3, 11]
     estimates = {name: float(e.value) for name, e in course.summary().estimates.items()}
     assert estimates == {
-        "before": 10.0,
-        "just after": pytest.approx((4 + 4) / 2),
-        "end": 7.0,
-        "end, no fault": 10.0,
+        "return before": 10.0,
+        "return just after": pytest.approx((4 + 4) / 2),
+        "return at the end": 7.0,
+        "return at the end, no fault": 10.0,
         "cumulative loss": pytest.approx((30 + 66) / 2),
         "recovered": 0.5,
         "recovery time": 7.0,
     }
     e = course.summary().estimates["recovery time"]
-    assert (float(e.low), float(e.high)) == (0.0, 11.0), "of 11 episodes from the fault on"
+    assert format_estimate(e) == ">= 7", "one seed never recovers"
 
 
 class Pushing:
@@ -60,7 +61,7 @@ def test_a_fault_that_ends() -> None:
     assert (random.faulty == again.courses[1].faulty).all()
     lines = str(table).splitlines()
     assert max(map(len, lines)) <= 80
-    assert any(line.startswith(f"Levels are mean returns of {BLOCK} ") for line in lines)
+    assert any(line.startswith(f"Returns are means of {BLOCK} ") for line in lines)
 
 
 def test_a_policy_may_be_told_that_a_run_begins() -> None:

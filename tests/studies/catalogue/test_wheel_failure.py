@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,12 +21,13 @@ from nested_agents.studies.catalogue.wheel_failure import (
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.report.sentences import condition_sentences
+from nested_agents.studies.report.sentences import condition_sentences, main_title
 from nested_agents.studies.results.comparison import compare_conditions
-from nested_agents.studies.results.measured import default_measure
+from nested_agents.studies.results.measured import default_measure, values_of
 from nested_agents.studies.results.recovery import (
     LOWER_BOUND,
     RECOVERY,
+    TIMES,
     FailureCourse,
     failure_course,
 )
@@ -123,13 +125,36 @@ def test_mean_recovery_times_are_said_to_be_lower_bounds() -> None:
     assert said == {"study", "recovery_time", "recovery_decisions"}
 
 
+@pytest.mark.parametrize("name", TIMES)
+def test_times_of_seeds_that_never_recover_are_printed_as_lower_bounds(name: str) -> None:
+    results = wheel_failure(ENDS).frames()
+    lines = [*analyse(results).table, *compare_conditions(results, name).table]
+    title = RECOVERY[name].heading
+    table = tabulate([line for line in lines if title in line.estimates])
+    nothing, both = (
+        next(row[title] for label, row in table.cells.set_axis(labels).iterrows() if end in label)
+        for labels in [[line.condition for line in table.lines]]
+        for end in ("2 wheels, seized: nothing", "4 wheels, seized: both")
+    )
+    assert nothing.startswith(">= ")
+    assert "[" not in nothing
+    assert "[" in both, "all seeds recovered"
+    assert "Lower bounds (>=)" in " ".join(table.legend)
+    assert main_title(table) == AT_END
+    assert f"$\\ge{nothing.removeprefix('>= ')}$" in table.latex
+    (row,) = (r for r in json.loads(table.json) if "2 wheels, seized: nothing" in r["condition"])
+    assert row["estimates"][title]["high"] is None
+    with pytest.raises(SpecError, match="never recovers"):
+        values_of(results, name)
+
+
 def test_each_condition_has_the_range_of_its_own_failure() -> None:
     """A condition that fails late cannot need more episodes than it has left."""
     made = wheel_failure(ENDS)
     late = "4 wheels, seized, enabled=true"
     made.numbers[late]["onset"] = made.numbers[late]["onset"] + 10
     lines = compare_conditions(made.frames(), "recovery_time").table
-    highest = {line.condition: line.estimates["recovery time [episodes]"].high for line in lines}
+    highest = {line.condition: line.estimates["recovery time [episodes]"].value for line in lines}
     assert highest[late] <= 10 < max(highest.values())
 
 
@@ -148,7 +173,7 @@ def test_the_end_of_a_transient_failure_is_marked(tmp_path: Path) -> None:
     analysis = analyse(made.frames())
     for line in analysis.table:
         assert float(line.estimates["failure ends [episode]"].value) == 30.0
-        assert "after its end" in line.estimates
+        assert "success after its end" in line.estimates
     assert any("not adaptation" in note for note in analysis.notes)
     figure = draw(analysis)["wheel-failure"]
     (area,) = [p for p in figure.axes[0].patches if isinstance(p, Rectangle)]
@@ -204,7 +229,7 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
             arrays["success"][:] = 0
     analysis = analyse(results.frames())
     for line in analysis.table:
-        assert list(line.estimates) == ["before", "just after", AT_END]
+        assert list(line.estimates) == ["success before", "success just after", AT_END]
     text = " ".join(" ".join(analysis.notes).split())
     assert "not measured for seeds without success before the failure: fault (" in text
     with pytest.raises(SpecError, match="'recovered': no seed succeeded before a failure began"):
@@ -260,8 +285,9 @@ def test_a_level_after_a_failure_needs_as_many_episodes_as_all_levels() -> None:
     course = FailureCourse((6,), success, success, (0, 1))
     short = Course("fault", "both", ((6, 14),), course, 3).summary
     assert "failure ends [episode]" in short.estimates
-    assert "after its end" not in short.estimates
-    assert "after its end" in Course("fault", "both", ((6, 11),), course, 3).summary.estimates
+    assert "success after its end" not in short.estimates
+    long = Course("fault", "both", ((6, 11),), course, 3).summary
+    assert "success after its end" in long.estimates
 
 
 @pytest.mark.parametrize(
