@@ -64,7 +64,7 @@ def censored(mean: Estimate, is_censored: ArrayLike) -> Estimate:
     >>> type(censored(bootstrap([2.0, 8.0]), [False, True])).__name__
     'LowerBound'
     """
-    return LowerBound(mean.value, mean.low, np.inf) if np.any(is_censored) else mean
+    return LowerBound(mean.value, mean.low, np.asarray(np.inf)) if np.any(is_censored) else mean
 
 
 def exactly(value: ArrayLike) -> Estimate:
