@@ -102,7 +102,8 @@ class Messages:
     def advance(self, joint_action: IntArray, payloads: Payloads = NO_PAYLOADS) -> None:
         """Keep the actions and payloads of a decision, and go on to the next one."""
         if self._history_length:
-            past_actions = [*self._past_actions, joint_action.copy()]
+            sent = np.where(self.left | self.absent, LOST, joint_action)
+            past_actions = [*self._past_actions, sent]
             past_payloads = [*self._past_payloads, payloads]
             self._past_actions = past_actions[-self._history_length :]
             self._past_payloads = past_payloads[-self._history_length :]
@@ -203,6 +204,7 @@ class Messages:
 
         Delays come before other failures, and of several delays the longest counts.
         """
+        senders = senders[history[-1][senders] != LOST]  # absent in an earlier decision
         actions = history[-1][senders]
         ages = np.full(len(senders), age)
         delays = [failure.history_length for failure in self.failures]

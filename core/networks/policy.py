@@ -124,14 +124,18 @@ class Policy:
         rollout.decided[t] = decided
         rollout.log_probs[t] = ((chosen - log_sum_exp(logits)) * decided).sum(axis=-1)
         rollout.last[t] = last
-        rollout.rewards[t] = self._normalize(rewards, last)
+        rollout.rewards[t] = self._normalize(rewards, last, np.logical_or.reduce(decided, axis=-1))
         rollout.steps += 1
         self._decisions += len(last)
 
-    def _normalize(self, rewards: FloatArray, last: BoolArray) -> FloatArray:
-        """Return rewards ``(E, k)`` divided by the standard deviation of discounted returns."""
-        self._returns = self.settings.discount * self._returns + rewards
-        self._moments.add(self._returns)
+    def _normalize(self, rewards: FloatArray, last: BoolArray, decided: BoolArray) -> FloatArray:
+        """Return rewards ``(E, k)`` divided by the standard deviation of discounted returns.
+
+        The return of an agent that has not `decided` ``(k,)`` is left out and begins again.
+        """
+        self._returns = (self.settings.discount * self._returns + rewards) * decided
+        if decided.any():
+            self._moments.add(self._returns[:, decided])
         self._returns[last] = 0.0
         return np.clip(rewards / self._moments.deviation, -MAX_REWARD, MAX_REWARD)
 
@@ -181,9 +185,7 @@ class Policy:
             rollout.actor_inputs[..., self.shape.n_told :], rollout.joint_inputs
         )
         values = self.critic(critic_inputs).reshape(rollout.rewards.shape)
-        advantages = generalized_advantages(
-            rollout.rewards, values, next_values, rollout.last, self.settings
-        )
+        advantages = generalized_advantages(rollout, values, next_values, self.settings)
         batch = Batch(
             actor_inputs=rollout.actor_inputs.reshape(-1, rollout.actor_inputs.shape[-1]),
             critic_inputs=critic_inputs,
@@ -193,7 +195,8 @@ class Policy:
             advantages=advantages.ravel().astype(np.float32),
             returns=(advantages + values).ravel().astype(np.float32),
         )
-        return batch.take(np.flatnonzero(batch.decided.any(axis=1)))
+        decided = batch.decided.any(axis=1)
+        return batch if decided.all() else batch.take(np.flatnonzero(decided))
 
     def loss_and_grad(self, batch: Batch, entropy: float) -> float:
         """Return the loss of a minibatch and write its gradient to `gradient`.

@@ -96,32 +96,35 @@ class Rollout:
 
 
 def generalized_advantages(
-    rewards: FloatArray, values: FloatArray, next_values: FloatArray, last: BoolArray,
-    settings: NetworkSettings,
-) -> FloatArray:  # fmt: skip
+    rollout: Rollout, values: FloatArray, next_values: FloatArray, settings: NetworkSettings
+) -> FloatArray:
     """Return generalized advantage estimates ``(T, E, k)`` (Schulman et al. 2016).
 
     Backward in time, where nothing follows the end of an episode::
 
         d_t = r_t + gamma v_t+1 - v_t,    A_t = d_t + gamma lambda A_t+1
 
+    An absence of an agent is a truncation: ``A_t = d_t`` before it, and 0 while it lasts.
+
     Parameters
     ----------
-    rewards, values
-        ``(T, E, k)``; rewards before a truncation contain the discounted value of the next state.
+    rollout
+        A full rollout; rewards before a truncation contain the discounted value of the next state.
+    values
+        ``(T, E, k)`` values of its states.
     next_values
         ``(E, k)`` values of the states after the rollout.
-    last
-        ``(T, E)`` whether an episode ends.
     settings
         Discount and trace decay.
     """
     advantages = np.empty_like(values)
     advantage: FloatArray = np.zeros_like(next_values)
-    for t in range(len(rewards) - 1, -1, -1):
-        discount = settings.discount * ~last[t][:, None]
-        advantage = rewards[t] + discount * (next_values + settings.gae_lambda * advantage)
+    decided: BoolArray = np.logical_or.reduce(rollout.decided, axis=-1)
+    for t in range(len(values) - 1, -1, -1):
+        discount = settings.discount * ~rollout.last[t][:, None]
+        advantage = rollout.rewards[t] + discount * (next_values + settings.gae_lambda * advantage)
         advantage -= values[t]
+        advantage *= decided[t]
         advantages[t] = advantage
         next_values = values[t]
     return advantages

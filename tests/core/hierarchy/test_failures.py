@@ -9,6 +9,7 @@ from nested_agents.core.hierarchy.failures import (
     GARBLED,
     AbsentAgents,
     DelayedMessages,
+    LeftAgents,
     LostMessages,
     MessageFailure,
     NoisyMessages,
@@ -82,14 +83,14 @@ def test_several_failures_of_one_agent_delay_first(is_first: bool) -> None:
     made = messages(*delay)
     made.reset(0, 0)
     for n in range(3):
-        made.advance(np.array([n, 3, 3]))
+        made.advance(np.array([n, 3, 3, 3]))
     _, actions, ages = made.received(1, DECIDED)
     assert (actions.tolist(), ages.tolist()) == ([1], [2])
     garbled = messages(*(delay[1], noise)[:: 1 if is_first else -1])
     drawn = set()
     for seed in range(20):
         garbled.reset(seed, 0)
-        garbled.advance(np.array([1, 3, 3]))
+        garbled.advance(np.array([1, 3, 3, 3]))
         _, actions, ages = garbled.received(1, DECIDED)
         drawn |= {(*actions.tolist(), *ages.tolist())}
     assert {age for action, age in drawn if action != 1} == {GARBLED}
@@ -104,6 +105,18 @@ def test_who_is_absent_says_nothing() -> None:
     assert heard(made, 1) == {}
     made.reset(5, episode=2)
     assert not made.absent.any()
+
+
+@pytest.mark.parametrize("absence", [AbsentAgents, LeftAgents])
+def test_no_message_of_an_absence_arrives_later(absence) -> None:
+    made = messages(
+        absence(agents="a", end_episode=0, end_step=1),
+        DelayedMessages(agents="*"),
+        NoisyMessages(agents="*", probability=0.5),
+    )
+    for senders in ([1], [0, 1]):
+        made.advance(DECIDED)
+        assert made.received(2, DECIDED)[0].tolist() == senders
 
 
 def test_the_same_seed_loses_the_same_messages() -> None:

@@ -17,6 +17,7 @@ from nested_agents.core.interface.experience import Experience
 from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
+from nested_agents.core.networks.agents import CentralPPOAgents
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -409,3 +410,51 @@ def test_a_chain_finds_the_optimum_of_games_where_independent_agents_do_not(game
         last = next(row for row in rows if row.phase == "evaluation")
         rates[trial.settings.topology.kind].append(last.measures["success"])
     assert rates == {"chain": [1], "independent": [0]}
+
+
+@pytest.mark.parametrize("kind", ["absent", "left"])
+def test_an_absent_agent_learns_nothing(kind: str) -> None:
+    failure = {"kind": kind, "agents": "cart2"}
+    scenario = LineUpSettings(carts=3).build()
+    team, agents = team_of(scenario, None, failures_of(failure), weights="own")
+    team.reset(0, 0, learn=True)
+    before = agents.state_dict()
+    sequence(scenario, team, 40)
+    after = agents.state_dict()
+    changed = {cart: not np.array_equal(before[cart], after[cart]) for cart in before}
+    for array in ("weights", "moments", "adam.steps"):
+        assert [changed[f"cart{k}.{array}"] for k in (1, 2, 3)] == [True, False, True]
+
+
+@pytest.mark.parametrize("kind", ["absent", "left"])
+def test_shared_weights_learn_from_the_agents_that_act(kind: str, monkeypatch: Any) -> None:
+    failure = {"kind": kind, "agents": "cart2", "step": 4, "end_episode": 0, "end_step": 14}
+    scenario = LineUpSettings(carts=3).build()
+    team, agents = team_of(scenario, None, failures_of(failure), epochs=1)
+    policy = agents.policies["all"]
+    learned: list[int] = []
+    loss_and_grad = policy.loss_and_grad
+
+    def spy(batch: Any, entropy: float) -> float:
+        learned.append(len(batch.actions))
+        return loss_and_grad(batch, entropy)
+
+    monkeypatch.setattr(policy, "loss_and_grad", spy)
+    team.reset(0, 0, learn=True)
+    sequence(scenario, team, 16)
+    assert sum(learned) == 3 * 16 - 10
+    assert policy.state_dict()["moments"][0] == pytest.approx(3 * 16 - 10, abs=1e-3)
+
+
+def test_a_central_policy_in_a_mixed_team_learns_without_an_absent_member() -> None:
+    failure = {"kind": "absent", "agents": "cart2"}
+    scenario = LineUpSettings(carts=3).build()
+    parts = [{"agents": "*", "learner": {**SHORT, "kind": "ppo"}}]
+    settings = LEARNERS.model("mixed").model_validate({"kind": "mixed", "parts": parts})
+    hierarchy = Hierarchy(scenario.agents, [])
+    seed = np.random.SeedSequence(0)
+    team = Team(settings, scenario, hierarchy, seed, failures_of(failure))
+    team.reset(0, 0, learn=True)
+    sequence(scenario, team, 15)
+    rollout = team.only(CentralPPOAgents).policies["all"].rollout
+    assert rollout.decided[:15].reshape(-1, 3).all(axis=0).tolist() == [True, False, True]

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from nested_agents.core.networks.policy import Policy, linear_decay
-from nested_agents.core.networks.rollout import Batch, Choices, PolicyShape, generalized_advantages
+from nested_agents.core.networks.rollout import (
+    Batch,
+    Choices,
+    PolicyShape,
+    Rollout,
+    generalized_advantages,
+)
 from nested_agents.core.networks.settings import HierarchyPPOSettings
 
 SHAPE = PolicyShape(n_told=2, n_own=4, n_joint=3, n_heads=1, n_actions=5)
@@ -100,21 +106,40 @@ def test_the_loss_does_not_depend_on_the_order_of_transitions():
     assert np.allclose(policy.gradient, gradient, rtol=0.0, atol=1e-6)
 
 
-def test_advantages_by_hand():
+@pytest.mark.parametrize(
+    ("decided", "last", "expected"),
+    [
+        # 4 + .5 8 - 2; an end: 2 - 1; 1 + .5 1 - 1 + .25 1
+        ([True, True, True], [False, True, False], [0.75, 1.0, 6.0]),
+        # An absence is a truncation: 1 + .5 1 - 1
+        ([True, False, True], [False, False, False], [0.5, 0.0, 6.0]),
+    ],
+)
+def test_advantages_by_hand(decided, last, expected):
     settings = HierarchyPPOSettings(discount=0.5, gae_lambda=0.5)
-    rewards = np.array([1.0, 2.0, 4.0])[:, None, None]
+    rollout = Rollout(3, 1, 1, SHAPE)
+    rollout.rewards[:] = np.array([1.0, 2.0, 4.0])[:, None, None]
+    rollout.decided[:] = np.reshape(decided, (3, 1, 1, 1))
+    rollout.last[:] = np.reshape(last, (3, 1))
     values = np.array([1.0, 1.0, 2.0])[:, None, None]
-    last = np.array([False, True, False])[:, None]
-    advantages = generalized_advantages(rewards, values, np.array([[8.0]]), last, settings)
-    # 4 + .5 8 - 2; an end: 2 - 1; 1 + .5 1 - 1 + .25 1
-    assert advantages.ravel().tolist() == [0.75, 1.0, 6.0]
+    advantages = generalized_advantages(rollout, values, np.array([[8.0]]), settings)
+    assert advantages.ravel().tolist() == expected
 
 
-def append(policy, rewards, last):
+def test_rewards_of_absent_agents_normalize_nothing():
+    policies = [policy_of(rollout=20, discount=0.5) for _ in range(2)]
+    for reward in np.random.default_rng(0).normal(size=20):
+        for policy, unpaid in zip(policies, (0.0, 100.0), strict=True):
+            append(policy, np.array([reward, unpaid]), False, (True, False))
+    rewards = [policy.rollout.rewards[:, 0, 0] for policy in policies]
+    assert np.array_equal(*rewards)
+
+
+def append(policy, rewards, last, decided=(True, True)):
     k = len(rewards)
     inputs = np.zeros((1, k, 6)), np.zeros((1, 3))
     logits, actions = np.zeros((1, k, 1, 5)), np.zeros((1, k, 1), int)
-    choices = Choices(logits, actions, np.ones((2, 1), bool))
+    choices = Choices(logits, actions, np.array(decided)[:, None])
     policy.append(inputs, choices, np.array([rewards]), np.array([last]))
 
 
