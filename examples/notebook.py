@@ -25,12 +25,12 @@ short = {"seeds": 2, "episodes": 1, "steps": 12, "evaluation": 2, "preset": "own
 spec = na.Spec(study="scaling", sweep={"scenario.robots": [1, 2]}, **short)
 print(na.plan(spec, jobs=1, timed=False))
 study = na.run(spec, OUT, jobs=1)
-print(study.table(["evaluation success", "decision [ms]"]))
+print(study.table(["evaluation success", "decision time [ms]"]))
 comparison = study.compare(by="robots", measure="steps")
 print(comparison)
 study.figure().savefig(f"{OUT}/scaling.pdf")
 own = na.run(na.Spec(study="scaling", topology=leaders, **short), f"{OUT}-own", jobs=1)
-print(na.load(OUT, f"{OUT}-own").where("robots == 2").compare(measure="decision_median"))
+print(na.load(OUT, f"{OUT}-own").where("robots == 2").compare(measure="decision_ms"))
 print(own.report(), own.replay().path)
 
 # 3. What it costs, by the formulas of the paper, as a table for a paper.

@@ -40,7 +40,7 @@ NOTES = (
 )
 PANELS = {
     EVALUATED: "success",
-    "ms": "time of a decision [ms]",
+    "ms": "decision time [ms]",
     "memory [kB]": "memory [kB]",
     "counted": "operations of a decision",
 }

@@ -19,8 +19,8 @@ def meanings(titles: Iterable[str]) -> dict[str, str]:
 
     Examples
     --------
-    >>> meanings(["decision [ms]", "humidity"])
-    {'decision [ms]': 'median time of a decision of the whole team'}
+    >>> meanings(["decision time [ms]", "humidity"])
+    {'decision time [ms]': 'median time of a decision of the whole team'}
     """
     names = {title: title.partition(" [")[0] for title in titles}
     matches = {

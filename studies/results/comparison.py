@@ -159,11 +159,12 @@ def compare_conditions(
             f"{', '.join([*others, STEPS.name, RETURN.name])}"
         )
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
+    title = title_of(shown, phase)
     pairs: dict[str, list[Pair]] = {}
     for setting, members in groups.items():
         base, *others = members
         pairs[setting] = [
-            (n, measure, *_pair(values[members[n]], values[members[base]], results.pairs_episodes))
+            (n, title, *_pair(values[members[n]], values[members[base]], results.pairs_episodes))
             for n in others
         ]
     compared = differences(pairs, shown)

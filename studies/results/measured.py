@@ -174,11 +174,13 @@ def trial_numbers(
     """
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
-    names = {c: (c, c.removeprefix(SECONDS), describe_number(c)[0].heading) for c in columns}
+    shown = {c: describe_number(c)[0] for c in columns}
+    names = {c: (c, c.removeprefix(SECONDS), m.name, m.heading) for c, m in shown.items()}
     column = next((c for c in columns if name in names[c]), None)
     if column is None:
-        spellings = [*others, *columns, *(heading for _, _, heading in names.values())]
-        known = f"{near(name, spellings)} known: {', '.join(sorted({*others, *columns}))}".lstrip()
+        named = sorted({*others, *(m.name for m in shown.values())})
+        spellings = [*named, *(m.heading for m in shown.values())]
+        known = f"{near(name, spellings)} known: {', '.join(named)}".lstrip()
         if not results.phases and name == RETURN.name:  # the measure by default
             raise SpecError(f"measure: name one, because there are no episodes; {known}")
         raise SpecError(f"measure = {name!r}: {known}")

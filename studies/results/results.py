@@ -374,8 +374,11 @@ and of numbers of whole trials."""
 
 SHARES = ("least_touching", "all_touching")
 """Numbers of whole trials that are shares."""
-_TITLES = {"decision_median": "decision", "decision_99": "99th percentile of decisions"}
-"""Headings of numbers that are shown in milliseconds."""
+_IN_MS = {
+    "decision_median": ("decision_ms", "decision time"),
+    "decision_99": ("decision_99_ms", "99th percentile of decision time"),
+}
+"""Name and title of numbers that are shown in milliseconds."""
 
 
 def describe_number(name: str) -> tuple[Measure, float]:
@@ -384,13 +387,13 @@ def describe_number(name: str) -> tuple[Measure, float]:
     Examples
     --------
     >>> measure, factor = describe_number("decision_median")
-    >>> measure.unit, factor
-    ('ms', 1000.0)
+    >>> measure.name, measure.heading, factor
+    ('decision_ms', 'decision time [ms]', 1000.0)
     >>> describe_number("messages")[0].unit
     '1'
     """
-    if name in _TITLES:
-        return Measure(name, _TITLES[name], "ms", better="lower", least=0.0), 1e3
+    if name in _IN_MS:
+        return Measure(*_IN_MS[name], "ms", better="lower", least=0.0), 1e3
     is_time = name.startswith((SECONDS, CPU))
     unit, *_ = NUMBERS.get(name, ("s" if is_time else "1",))
     least = 0.0 if is_time or name in NUMBERS else None  # numbers of other studies may be negative

@@ -115,7 +115,7 @@ def test_three_uses_in_thirty_lines(
     out = capsys.readouterr().out
     assert "Hierarchy(4 agents: robot1.left -> robot1.right, robot1.left -> robot2.left" in out
     assert "At least 6 seeds are needed" in " ".join(out.split())
-    assert "decision [ms], minus that of" in out
+    assert "decision time [ms], minus that of" in out
     assert "The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4" in out
     assert r"\begin{tabular}{rlrrrrr}" in out
     assert (tmp_path / "study" / "scaling.pdf").is_file()

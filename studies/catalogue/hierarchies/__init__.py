@@ -44,7 +44,7 @@ VALUE_OF = "learner.decision.value_of"
 """Key that is swept to vary the value that decides."""
 REFERENCE = "chain"
 """Reference of comparisons, if it is among the hierarchies."""
-DECIDING = "decision [ms]"
+DECIDING = "decision time [ms]"
 """Title of the time of a decision."""
 MESSAGES = "Messages: communicated decisions, without the states broadcast for prediction."
 

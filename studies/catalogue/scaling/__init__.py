@@ -27,7 +27,7 @@ NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median")
 """Numbers of whole trials that the analysis needs."""
 PUBLISHED = ("success",)
 """Measures in published results."""
-PANELS = ("decision [ms]", "learning [ms]", "team [MB]", "messages")
+PANELS = ("decision time [ms]", "learning [ms]", "team [MB]", "messages")
 """Titles of the panels of the figure after that of evaluation."""
 
 
@@ -99,7 +99,7 @@ def _case(results: Results, condition: str, sizes: Sizes) -> SizedCase:
     if "all_touching" in numbers:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
     costs = {
-        "decision [ms]": 1e3 * numbers["decision_median"],
+        "decision time [ms]": 1e3 * numbers["decision_median"],
         "learning [ms]": 1e3 * numbers["seconds.learning"] / steps.sum(axis=1),
         "team [MB]": 1e-6 * numbers["team_bytes"],
     }

@@ -83,7 +83,7 @@ def test_commands_predict_and_check(tables, tmp_path, capsys):
     columns = ["--columns", "condition=agents"]
     small, large = str(tables / "small.csv"), str(tables / "large.csv")
     assert main(["scalability", small, *columns, "--predict", "16", "32", "--out", str(path)]) == 0
-    assert "2 predictions, sha256" in capsys.readouterr().out
+    assert "2 predictions, sha256" in " ".join(capsys.readouterr().out.split())
     assert main(["scalability", large, *columns, "--check", str(path), "--format", "json"]) == 0
     assert [own["held"] for own in json.loads(capsys.readouterr().out)["checked"]] == [True, True]
     assert main(["scalability", large, *columns, "--check", small]) == 2
