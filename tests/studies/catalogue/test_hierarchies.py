@@ -100,7 +100,8 @@ def test_costs_stand_beside_success() -> None:
         "2 robots, own, star", "2 robots, own, chain", "2 robots, own, tree:2",
     ]  # fmt: skip
     chain = by_name["8 robots, own, chain"]
-    assert list(chain) == ["evaluation success", "decisions to goal", "decision time [ms]", "messages"]
+    titles = ["evaluation success", "decisions to goal", "decision time [ms]", "messages"]
+    assert list(chain) == titles
     assert chain["messages"].value == 120.0
     assert 1.4 < chain["decision time [ms]"].low < 1.6 < chain["decision time [ms]"].high < 1.8
     assert 30.0 < chain["decisions to goal"].value < 90.0

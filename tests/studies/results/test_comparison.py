@@ -120,7 +120,8 @@ def test_what_is_compared_goes_by_any_of_its_names() -> None:
     with pytest.raises(SpecError, match="reference = 'chain'"):
         compare_conditions(results, reference="chain")
     times = compare_conditions(results, "decision_ms")
-    assert times.title == compare_conditions(results, "decision time [ms]").title == "decision time [ms]"
+    title = "decision time [ms]"
+    assert times.title == compare_conditions(results, title).title == title
     with pytest.raises(SpecError, match=r"did you mean 'decision_ms'"):
         compare_conditions(results, "decisions_ms")
     times = scaling({2: 0.9, 4: 0.8}).frames()
