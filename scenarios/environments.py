@@ -21,6 +21,7 @@ from ..core.interface.abilities import Recorded, measurements_of, options_of
 from ..core.interface.recording import EpisodeRecorder
 from ..core.interface.scenario import Scenario
 from ..core.numerics import FloatArray, IntArray
+from ..core.plugins.words import show
 from .library_types import Options
 
 Observations = dict[str, FloatArray]
@@ -67,6 +68,47 @@ def observed_places(scenario: Scenario, members: Sequence[int], *, by_agent: boo
         parts += [every[controlled, : space.n_own].ravel()]
         parts += [every[controlled[:1], space.n_own :].ravel()]
     return np.concatenate(parts)
+
+
+def checked_action(
+    action: object, space: Discrete | MultiDiscrete, agents: Sequence[str]
+) -> IntArray:
+    """Return an action of a player as whole numbers: ``()``, or ``(k,)`` for k agents.
+
+    Parameters
+    ----------
+    action
+        A whole number, or one for each of several agents; their type may be float.
+    space
+        A Discrete or MultiDiscrete space from 0.
+    agents
+        The agents for which the player acts.
+
+    Raises
+    ------
+    ValueError
+        If it is not in the space; one line names the agent, its action and what is allowed.
+
+    Examples
+    --------
+    >>> checked_action([0, 2.0], MultiDiscrete([4, 3]), ["left", "right"])
+    array([0, 2])
+    >>> checked_action([0, -1], MultiDiscrete([4, 3]), ["left", "right"])
+    Traceback (most recent call last):
+    ValueError: step: action -1 of right, allowed: whole numbers from 0 to 2
+    """
+    numbers = np.asarray(action, dtype=object)
+    counts: IntArray = np.asarray(space.n if isinstance(space, Discrete) else space.nvec)
+    if numbers.shape != counts.shape:
+        raise ValueError(f"step: action {show(action)} of {', '.join(agents)}, allowed: {space}")
+    for agent, number, n in zip(agents, numbers.flat, counts.flat, strict=True):
+        is_number = isinstance(number, int | float | np.number)
+        if not (is_number and 0 <= number < n and number == int(number)):
+            raise ValueError(
+                f"step: action {show(number)} of {agent}, allowed: whole numbers from 0 to {n - 1}"
+            )
+    whole: IntArray = numbers.astype(np.int64)[()]
+    return whole
 
 
 class AgentsEnv(ParallelEnv):
@@ -184,6 +226,11 @@ class AgentsEnv(ParallelEnv):
         tuple
             Observations, rewards, terminations, truncations and infos by agent; all empty after the
             end of an episode, as in PettingZoo.
+
+        Raises
+        ------
+        ValueError
+            If an action is missing, unknown or not in its space; one line.
         """
         if not self.agents:
             return {}, {}, {}, {}, {}
@@ -193,7 +240,9 @@ class AgentsEnv(ParallelEnv):
             raise ValueError(f"step: actions of {list(actions)}: {problem}; agents: {self.agents}")
         joint = np.empty(len(self.scenario.agents), dtype=np.int64)
         for name in self.agents:
-            joint[self.members[name]] = actions[name]
+            members = self.members[name]
+            own = [self.scenario.agents[i] for i in members]
+            joint[members] = checked_action(actions[name], self.action_spaces[name], own)
         transition = self.scenario.step(joint)
         self._step += 1
         if self._recorder is not None:
@@ -279,7 +328,7 @@ class JointEnv(gymnasium.Env):
     def step(self, action: ArrayLike) -> tuple[FloatArray, float, bool, bool, dict[str, object]]:
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         self._env.agents = ["single"]  # Gymnasium lets an episode be continued after its end
-        actions = {"single": np.asarray(action, dtype=np.int64)}
+        actions = {"single": np.asarray(action, dtype=object)}
         observations, rewards, *flags, infos = self._env.step(actions)
         terminated, truncated = (flag["single"] for flag in flags)
         return observations["single"], rewards["single"], terminated, truncated, infos["single"]

@@ -40,10 +40,11 @@ class NetworkSettings(TeamSettings):
     """Number of environments that are stepped at once; 2 or more need a budget in decisions."""
     learning_rate_decisions: Count | None = None
     """Decisions, summed over all environments, over which `learning_rate` falls linearly to 0.
-    Without a number it stays constant."""
+    Without a number it stays constant. The count begins again in every stage of a curriculum, as
+    does the optimizer."""
     entropy_decisions: Count | None = None
     """Decisions, summed over all environments, over which `entropy` falls linearly to 0. Without a
-    number it stays constant."""
+    number it stays constant. The count begins again in every stage of a curriculum."""
 
     @property
     def n_environments(self) -> int:

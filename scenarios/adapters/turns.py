@@ -24,6 +24,7 @@ from ...core.hierarchy.failures import AbsentAgents, LeftAgents, MessageFailure
 from ...core.hierarchy.hierarchy import Hierarchy
 from ...core.hierarchy.messages import Messages
 from ...core.numerics import FloatArray, IntArray
+from ..environments import checked_action
 from ..library_types import Data, Options, Space
 from .simulators import Player
 
@@ -177,10 +178,9 @@ class TurnBasedEnv(parallel_to_aec_wrapper):
         """
         agent = self.agent_selection
         is_done = self.terminations[agent] or self.truncations[agent]
-        if not is_done and not self.action_space(agent).contains(action):
-            raise ValueError(
-                f"step: action {action!r} of {agent}, allowed: {self.action_space(agent)}"
-            )
+        if not is_done:
+            names = [agent] * len(self._n_actions[agent])
+            action = checked_action(action, self.action_space(agent), names)
         super().step(action)
 
 

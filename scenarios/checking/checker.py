@@ -19,7 +19,7 @@ from ...core.interface.abilities import horizon_of
 from ...core.plugins.words import expect, expect_each, show
 from . import checks
 from .episodes import CheckPlan
-from .sensing import VariableSummary, predicted_steps, summarize_variables
+from .sensing import VariableSummary, fault_of_rewards, predicted_steps, summarize_variables
 
 CHECKS: dict[str, Callable[[CheckPlan], Iterator[str]]] = {
     "form": checks.check_form,
@@ -139,8 +139,11 @@ def check_scenario(
         predicted_steps(scenario, seed, episode, actions, horizon_of(scenario))
         for seed, episode in plan.runs
     ]
+    all_steps = np.concatenate(played)
+    if fault := fault_of_rewards(all_steps):
+        raise ScenarioError(f"predictions: {fault}")
     passed = tuple(name for name in CHECKS if name not in plan.skipped)
-    return CheckReport(passed, plan.skipped, summarize_variables(scenario, np.concatenate(played)))
+    return CheckReport(passed, plan.skipped, summarize_variables(scenario, all_steps))
 
 
 def _describe(error: BaseException) -> str:

@@ -19,6 +19,10 @@ from .predictions import state_differences
 
 TOLERANCE = 1e-6
 """Allowed difference of sensed and predicted variables relative to their range."""
+MIN_REWARDS = 20
+"""Minimum number of steps from which the correlation of rewards is judged."""
+MAX_OPPOSITION = -0.5
+"""Correlation of predicted and received rewards from which on their signs are opposite."""
 
 
 class VariableSummary(NamedTuple):
@@ -119,6 +123,28 @@ def faults_of_sensing(scenario: Scenario, steps: FloatArray) -> Iterator[str]:
             f"{variables[j].name} of agent {i} is {after[step, i, j]:.6g}, predicted "
             f"{predicted[step, i, j]:.6g}, {when(int(step) + 1)}"
         )
+
+
+def fault_of_rewards(steps: FloatArray) -> str:
+    """Return what is wrong if rewards fall where they are predicted to rise, else nothing.
+
+    Parameters
+    ----------
+    steps
+        ``(m, 3, n, d + 1)`` of several episodes, see `predicted_steps`.
+    """
+    _, predicted, after = steps[:, :, 0, -1].T
+    if len(steps) < MIN_REWARDS or not np.isfinite(predicted).all():
+        return ""
+    if min(np.ptp(predicted), np.ptp(after)) <= TOLERANCE * np.abs(after).max():
+        return ""
+    correlation = float(np.corrcoef(predicted, after)[0, 1])
+    if correlation > MAX_OPPOSITION:
+        return ""
+    return (
+        f"predicted and received rewards have the correlation {correlation:.2f} over "
+        f"{len(steps)} steps: is the sign of one of them wrong?"
+    )
 
 
 def summarize_variables(scenario: Scenario, steps: FloatArray) -> tuple[VariableSummary, ...]:

@@ -35,6 +35,21 @@ CHECKPOINT = 300.0
 """Default interval between checkpoints of a trial [s]."""
 
 
+def folder(out: Place) -> Path:
+    """Return the folder of a study that is to be written.
+
+    Raises
+    ------
+    ValueError
+        If it is not a path, or an empty one, which would be the current folder; one line.
+    """
+    allowed = "the path of a folder, '.' for the current one"
+    expect(allowed, str | PathLike, out=out)
+    if not str(out):
+        raise ValueError(f"out = '', allowed: {allowed}")
+    return Path(out)
+
+
 @contextmanager
 def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[Checkpoints]:
     """Create the folder of checkpoints; remove it on exit if it is empty."""
@@ -117,8 +132,7 @@ def run(
     KeyboardInterrupt
         If it is interrupted. Finished trials are kept, and the same call continues.
     """
-    expect("the path of a folder", str | PathLike, out=out)
-    directory = Path(out)
+    directory = folder(out)
     spec = Spec.read(spec, study=directory)
     listener = observer or (Terminal() if progress else Observer())
     measures = examine(spec, may_fail=True)

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import starmap
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...core.numerics import pd
-from ...core.plugins.words import expect, show
+from ...core.plugins.words import show
 from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..spec.spec import Spec
@@ -28,7 +27,7 @@ from ..store import durable
 from ..trials.arrangement import check_conditions
 from ..trials.trial import trials_of
 from ..workers.runner import Observer
-from .running import run
+from .running import folder, run
 from .study import StudyResults
 
 FIRST_SEED = 10_000
@@ -135,8 +134,7 @@ def tune(
     SpecError
         If there is nothing to tune, or the study cannot run; one line.
     """
-    expect("the path of a folder", str | PathLike, out=out)
-    out = Path(out)
+    out = folder(out)
     spec = Spec.read(spec, study=out)
     _check_request(spec, trials, seeds, first_seed, draw)
     configurations = _sample(spec, trials, draw)

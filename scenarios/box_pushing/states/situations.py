@@ -51,9 +51,11 @@ class Situation(NamedTuple):
     goal: tuple[float, float, float]
     """Goal pose of the box; the same in all situations."""
     origin: tuple[float, float, float]
-    """Pose of the box before the motion that led here."""
+    """Pose of the box before the motion that led here: at the previous decision in the present
+    situation, at the present decision in predicted situations."""
     periods: float
-    """Duration of that motion in decision periods; the same in all situations."""
+    """Duration of that motion in decision periods, the same in all situations: 1 in the present
+    situation, the horizon of the prediction in predicted ones. Divide motions by it."""
     friction_radius: float
     """Lever with which ground friction resists turning of the box [m]; likewise."""
     n_robots: int

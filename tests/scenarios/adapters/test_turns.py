@@ -226,7 +226,10 @@ def test_one_reward_for_a_joint_step_is_learned_from() -> None:
         (lambda: _of(action_space=gymnasium.spaces.Box(0, 1)), "actions of 'a': Box"),
         (lambda: _of(action_space=gymnasium.spaces.Discrete(2, start=1)), "actions of 'a'"),
         (lambda: _of(observation_space=gymnasium.spaces.Discrete(3)), "observations of 'a'"),
-        (lambda: _started().step(2), r"action 2 of a, allowed: Discrete\(2\)"),
+        (lambda: _started().step(2), "action 2 of a, allowed: whole numbers from 0 to 1"),
+        (lambda: _started().step(-1), "action -1 of a, "),
+        (lambda: _started().step(0.7), "action 0.7 of a, "),
+        (lambda: _started().step([0, 1]), r"action \[0, 1\] of a, "),
         (lambda: _started().step(None), "action None of a"),
     ],
 )

@@ -45,6 +45,23 @@ SETTINGS = [
 ]
 
 
+@pytest.mark.parametrize("wrong", [-1, 1.7, 5, None, [0], np.nan, "1", np.int64(5)])
+def test_actions_outside_their_space_are_refused(wrong: Any) -> None:
+    played = environments.parallel("line-up", carts=2)
+    played.reset(seed=0)
+    single = gymnasium.make(env_id("LineUp"), carts=2, disable_env_checker=True)
+    single.reset(seed=0)
+    for step in (
+        lambda: played.step({"cart1": 0, "cart2": wrong}),
+        lambda: single.step([0, wrong]),
+    ):
+        with pytest.raises(ValueError, match=r"^step: action .* of .*cart2, allowed: ") as raised:
+            step()
+        assert "\n" not in str(raised.value)
+    played.step({"cart1": np.int64(0), "cart2": np.array(3)})
+    single.step(np.array([0.0, 3.0]))
+
+
 @pytest.mark.parametrize("kind", PARALLEL)
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_pettingzoo_finds_nothing(kind: Any, settings: BoxPushingSettings) -> None:

@@ -490,7 +490,11 @@ def predicting(**members: Any) -> Callable[[], Scenario]:
 
 
 def far_reward(self: Any, joint_actions: Any) -> Any:
-    return -10 * LineUpPrediction.rewards(self, joint_actions)
+    return 10 * LineUpPrediction.rewards(self, joint_actions)
+
+
+def opposite_reward(self: Any, joint_actions: Any) -> Any:
+    return -LineUpPrediction.rewards(self, joint_actions)
 
 
 SENSED = "sensed and predicted: "
@@ -643,6 +647,10 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
             )
         ),
         "predictions: states_by_group and states differ in distance of agent 0",
+    ),
+    "rewards of opposite sign": (
+        predicting(rewards=opposite_reward),
+        r"predictions: predicted and received rewards have the correlation -\d\.\d\d over 48 steps",
     ),
     "hidden state": (perceiving(stale), "equal seeds: .*seed 0 .*differ"),
     "plain prediction": (

@@ -19,3 +19,9 @@ def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
     ((condition, seed, error),) = study.failed
     assert (condition, seed) == ("frozen", 1)
     assert "a wheel came off" in error
+
+
+@pytest.mark.parametrize("write", [na.run, na.tune])
+def test_an_empty_path_is_not_the_current_folder(write) -> None:
+    with pytest.raises(ValueError, match=r"^out = '', allowed: the path of a folder, '\.' for"):
+        write(TABLE, "")
