@@ -43,6 +43,12 @@ class Scheduled(Settings):
         names: tuple[str, ...] = dict(self)[self.part]
         return names
 
+    @property
+    def span(self) -> tuple[int, int | None]:
+        """Episode in which the failure begins, and the first one without it, if it ends."""
+        end = self.end_episode
+        return self.episode, None if end is None else end + (self.end_step > 0)
+
     def lasts(self, episode: int, step: int) -> bool:
         """Return whether the failure is active at a step of an episode."""
         now = episode, step

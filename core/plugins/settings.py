@@ -298,8 +298,8 @@ class ScenarioSettings(PartSettings):
 
     @property
     def failure_spans(self) -> tuple[FailureSpan, ...]:
-        """Episodes in which failures begin and end."""
-        return tuple((f.episode, f.end_episode) for f in dict(self).get("failures", ()))
+        """Episode in which each failure begins, and the first one without it."""
+        return tuple(f.span for f in dict(self).get("failures", ()))
 
     @property
     def onset(self) -> int | None:

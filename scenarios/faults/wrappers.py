@@ -285,8 +285,8 @@ class FaultyEnv(_Faulty, gymnasium.Wrapper):
     mechanism
         Function that applies the faults that no action can express.
     inform
-        Whether ``info`` has the kinds of fault by actuator under ``faults``, and the executed
-        action under ``carried``.
+        Whether ``info`` has the kind of fault by actuator under ``faults`` (of several, the last
+        one), and the executed action under ``carried``.
 
     Attributes
     ----------

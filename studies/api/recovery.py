@@ -5,8 +5,8 @@ numbers. Returns are sums of rewards, of a parallel environment their mean over 
 episodes each there are the level *before* the onset, *just after* it and at the *end*. The
 *cumulative loss* is what the episodes from the onset on fall short of their like without fault. The
 *recovery time* is the number of episodes from the onset until `BLOCK` episodes in a row have
-regained `REGAINED` of what was lost just after it, always compared with the same episodes without
-fault. A seed that does not recover counts with all the episodes that were run: a lower bound.
+regained `REGAINED` of what was lost just after it and all faults have begun, always compared with
+the same episodes without fault. A seed that does not recover counts with all the episodes that were run: a lower bound.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -68,6 +68,8 @@ class FaultCourse(NamedTuple):
     """``(n_seeds, n_episodes)`` returns without the faults."""
     faulty: FloatArray
     """``(n_seeds, n_episodes)`` returns with the faults."""
+    last_onset: int
+    """Episode in which the last fault begins."""
     end: int | None = None
     """Episode from which on no fault is left, if there is one."""
 
@@ -79,7 +81,7 @@ class FaultCourse(NamedTuple):
     def recovery(self) -> tuple[FloatArray, FloatArray]:
         """Return per seed whether it recovered, and after how many episodes."""
         lost = np.maximum(self.shortfall[:, :BLOCK].mean(axis=1, keepdims=True), 0.0)
-        return recovery(self.shortfall, (1.0 - REGAINED) * lost)
+        return recovery(self.shortfall, (1.0 - REGAINED) * lost, self.last_onset - self.onset)
 
     def summary(self) -> Summary:
         """Return its line of the table."""
@@ -174,17 +176,14 @@ def recovery_table(
         healthy = np.array([returns(make, policy, (), s, episodes, steps, **wrapping) for s in run])
         for name, schedule in faults.items():
             faulty = [returns(make, policy, schedule, s, episodes, steps, **wrapping) for s in run]
-            onset = min(fault.episode for fault in schedule)
-            end = _last_end(schedule, episodes)
-            course = FaultCourse(f"{acting}: {name}", onset, healthy, np.array(faulty), end)
+            begins, ends = zip(*(fault.span for fault in schedule), strict=True)
+            end = max(episodes if end is None else end for end in ends)
+            course = FaultCourse(
+                f"{acting}: {name}", min(begins), healthy, np.array(faulty), max(begins),
+                end if end < episodes else None,
+            )  # fmt: skip
             courses.append(course)
     return RecoveryTable(tuple(courses))
-
-
-def _last_end(faults: Sequence[ActuatorFault], episodes: int) -> int | None:
-    """Return the episode from which on no fault is left, if it is one of so many."""
-    ends = [episodes if fault.end_episode is None else fault.end_episode for fault in faults]
-    return max(ends) if max(ends) < episodes else None
 
 
 def returns(

@@ -177,7 +177,7 @@ def _failure(own: SpecTable) -> str:
     """Return a failure as text: its kind, what fails, its settings, and its time.
 
     >>> _failure({"kind": "seized", "wheels": ["robot1.left"], "episode": 8, "end_episode": 11})
-    'seized, wheels robot1.left, from episode 8 to episode 11'
+    'seized, wheels robot1.left, from episode 8 until episode 11 begins'
     """
     rest = dict(own)
     start = _moment(rest.pop("episode"), rest.pop("step", 0))
@@ -186,7 +186,9 @@ def _failure(own: SpecTable) -> str:
     for key, value in rest.items():
         shown = ", ".join(map(str, value)) if isinstance(value, list) else value
         parts += [] if shown is None else [f"{key} {shown}"]
-    until = "on" if end is None else f"to {_moment(end, end_step)}"
+    until = "on" if end is None else f"until {_moment(end, end_step)}"
+    if end is not None and not end_step:
+        until += " begins"
     return f"{', '.join(parts)}, from {start} {until}"
 
 

@@ -116,9 +116,9 @@ class ConditionSettings(Settings):
 
     @property
     def failure_spans(self) -> tuple[FailureSpan, ...]:
-        """Episodes in which failures begin and end, or agents leave and return."""
+        """Episode in which each failure begins or agents leave, and the first one after it."""
         left = [f for f in self.topology.failures if isinstance(f, LeftAgents)]
-        return (*self.scenario.failure_spans, *((f.episode, f.end_episode) for f in left))
+        return (*self.scenario.failure_spans, *(f.span for f in left))
 
     @property
     def onset(self) -> int | None:

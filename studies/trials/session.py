@@ -57,8 +57,8 @@ class Session:
         The same scenario as the team sees it.
     team
         The agents.
-    decision_seconds
-        Duration of each decision in training [s].
+    decision_seconds, joint_actions
+        Duration of each decision in training [s], and the number of joint actions tried in it.
     usage
         Resources that a study adds during the trial, by name.
     training_cpu_s
@@ -74,9 +74,11 @@ class Session:
         self._rows: list[EpisodeRow] = []
         self._measures = self._own.measures
         self._recordings: dict[str, Recording] = {}
+        self._tried = 0
         self._seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.0)
         self._decisions = 0
         self.decision_seconds: list[float] = []
+        self.joint_actions: list[int] = []
         self.usage: dict[str, float] = {}
         self.training_cpu_s = 0.0
         self._checkpoint: Checkpoint | None = None
@@ -174,6 +176,7 @@ class Session:
             arrangement = self._own._replace(team=team)
         else:
             observers.append(self._time)
+            self._tried = self.team.counts.joint_actions
             is_recorded = isinstance(self.world, Recorded) and len(self.world.recorded) > 0
             if is_recorded and self.trial.recorded:
                 observers.append(self._record)
@@ -232,6 +235,9 @@ class Session:
         for part in self._seconds:
             self._seconds[part] += seconds.get(part, 0.0)
         self.decision_seconds.append(record.deciding)
+        tried = self.team.counts.joint_actions
+        self.joint_actions.append(tried - self._tried)
+        self._tried = tried
 
     def _record(self, record: StepRecord) -> None:
         """Record a step if `Trial.recorded` contains its episode."""

@@ -37,12 +37,15 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes)
     team = session.team
     hierarchy = team.hierarchy
-    tried = team.counts.joint_actions
+    tried = np.array(session.joint_actions)
+    # A team whose values are all zero searches nothing, as in its first episode.
+    searched = tried > 0 if tried.any() else tried == 0
+    seconds = np.array(session.decision_seconds)[searched]
     numbers = {
         "robots": float(len(session.world.groups)),
         "agents": float(len(hierarchy)),
         "messages": float(hierarchy.n_messages),
-        "joint_actions": tried / len(session.decision_seconds),
+        "joint_actions": float(tried[searched].mean()),
         "team_bytes": float(sum(array.nbytes for array in team.state_dict().values())),
         "weight_bytes": float(team.weight_bytes),
     }
@@ -67,8 +70,8 @@ def measure(trial: Trial) -> TrialResult:
         numbers["least_touching"] = float(np.mean(least))
         numbers["all_touching"] = float((np.array(least) >= 0.5).mean())
     usage = {
-        "decision_median": float(np.median(session.decision_seconds)),
-        "decision_99": float(np.quantile(session.decision_seconds, 0.99)),
+        "decision_median": float(np.median(seconds)),
+        "decision_99": float(np.quantile(seconds, 0.99)),
     }
     return session.result(numbers, usage)
 

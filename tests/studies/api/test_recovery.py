@@ -18,7 +18,7 @@ def test_numbers_by_hand() -> None:
     faulty = healthy.copy()
     faulty[0, 5:8] = 0.0  # recovers: a block in a row is as good as without the fault from 8 on
     faulty[1, 5:] = 4.0  # never does
-    course = FaultCourse("policy: fault", 5, healthy, faulty)
+    course = FaultCourse("policy: fault", 5, healthy, faulty, last_onset=5)
     recovered, episodes = course.recovery()
     assert recovered.tolist() == [1, 0]
     assert episodes.tolist() == [3, 11]
@@ -62,6 +62,18 @@ def test_a_fault_that_ends() -> None:
     lines = str(table).splitlines()
     assert max(map(len, lines)) <= 80
     assert any(line.startswith(f"Returns are means of {BLOCK} ") for line in lines)
+
+
+def test_a_team_recovers_only_after_the_last_fault_and_faults_end_with_their_last_step() -> None:
+    faulty = [
+        faults.Reversed(actuators=0, episode=5, end_episode=6),
+        faults.Reversed(actuators=0, episode=8, end_episode=10, end_step=5),
+    ]
+    table = faults.recovery_table(make, {"push": Pushing()}, {"two": faulty}, seeds=1, episodes=16)
+    (course,) = table.courses
+    assert (course.last_onset, course.end) == (8, 11)
+    recovered, episodes = course.recovery()
+    assert (recovered.item(), episodes.item() >= 5) == (1, True)
 
 
 def test_a_policy_may_be_told_that_a_run_begins() -> None:

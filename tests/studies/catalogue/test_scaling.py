@@ -134,6 +134,22 @@ def test_agents_of_every_kind_are_counted(
     assert 0 < result.numbers["weight_bytes"] <= result.numbers["team_bytes"]
 
 
+def test_decisions_without_a_search_are_not_averaged_in() -> None:
+    """In the first episode all values are zero, so that nothing is searched."""
+    table = {
+        "study": "scaling",
+        "seeds": [7],
+        "episodes": 3,
+        "steps": 4,
+        "evaluation": 1,
+        "topology": "independent",
+        "scenario": {"kind": "kinematic-chain", "joints": 6},
+        "learner": {"decision": {"evaluator": "best-response", "budget": 24}},
+    }
+    (trial,) = trials_of(Spec.of(table))
+    assert measure(trial).numbers["joint_actions"] == 24
+
+
 def test_weights_of_networks_by_hand() -> None:
     table = {
         "scenario": {"kind": "line-up", "carts": 2},
