@@ -6,7 +6,8 @@ episodes each there are the level *before* the onset, *just after* it and at the
 *cumulative loss* is what the episodes from the onset on fall short of their like without fault. The
 *recovery time* is the number of episodes from the onset until `BLOCK` episodes in a row have
 regained `REGAINED` of what was lost just after it and all faults have begun, always compared with
-the same episodes without fault. A seed that does not recover counts with all the episodes that were run: a lower bound.
+the same episodes without fault. A seed that does not recover counts with all the episodes that were
+run: a lower bound.
 """
 
 from collections.abc import Callable, Mapping, Sequence

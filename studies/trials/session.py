@@ -11,6 +11,8 @@ from functools import cached_property
 from time import process_time
 from typing import Any
 
+import numpy as np
+
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.many_environments import ManyEnvironmentsLoop
 from ...core.agents.team import Team
@@ -107,6 +109,8 @@ class Session:
         self._decisions = sum(row.steps for row in self._training_rows)
         self._recordings = {name: groups[f"{RECORDED}{name}"] for name in table["recordings"]}
         self._seconds.update(table["seconds"])
+        self.decision_seconds = groups["decisions"]["seconds"].tolist()
+        self.joint_actions = groups["decisions"]["joint_actions"].tolist()
         self.usage = table["usage"]
         self._stages = ()
 
@@ -127,6 +131,10 @@ class Session:
         }
         groups = {f"{RECORDED}{name}": arrays for name, arrays in self._recordings.items()}
         groups["team"] = self.team.state_dict()
+        groups["decisions"] = {
+            "seconds": np.array(self.decision_seconds),
+            "joint_actions": np.array(self.joint_actions, dtype=np.int64),
+        }
         self._checkpoint.write(table, groups)
 
     @property

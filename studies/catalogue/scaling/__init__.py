@@ -33,8 +33,8 @@ PANELS = ("decision time [ms]", "learning [ms]", "team [MB]", "messages")
 
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and measure its time and memory."""
-    session = Session(trial)
-    session.train(trial.episodes)
+    session = Session.resumed(trial)
+    session.train(trial.episodes - session.trained, session.trained)
     team = session.team
     hierarchy = team.hierarchy
     tried = np.array(session.joint_actions)

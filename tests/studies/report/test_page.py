@@ -82,7 +82,10 @@ def test_methods_name_failures_their_times_and_their_conditions(kept, tmp_path):
     ]
     spec = Spec.of({**SIZES, "overrides": overrides})
     described = methods_of(page(kept(tmp_path, spec, done=0)))
-    assert "seized, wheels robot1.front-left, from episode 2 until episode 3 begins (lost)" in described
+    assert (
+        "seized, wheels robot1.front-left, from episode 2 until episode 3 begins (lost)"
+        in described
+    )
     loss = "lost, agents *, probability 0.5, from step 4 of episode 1 on (lost)"
     assert loss in described
 

@@ -27,6 +27,7 @@ TABLES = {
     "ours": ONE,
     "fitted": {**ONE, "preset": "fitted-q", "scenario": {"kind": "line-up"}},
     "paper": {**ONE, "preset": "paper"},
+    "scaling": {**ONE, "study": "scaling"},
     "a wheel fails": {
         **ONE, "scenario": {"failures": [{"kind": "noisy", "wheels": "robot1.left", "episode": 2}]},
         "learner": {"self_model": {}},
