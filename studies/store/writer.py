@@ -16,7 +16,7 @@ from .connection import NO_LOCKS
 LOCK = ".lock"
 """Name of the file that the writing process locks."""
 MARK = "running.json"
-"""Name of the file that lists the running trials."""
+"""Name of the file that lists the running trials, removed when a run ends."""
 LOCK_WAITS_S = (0.05, 0.1, 0.0)
 """Wait after each attempt to take the lock, which a reader holds for an instant [s]."""
 
@@ -77,8 +77,8 @@ class Running(AbstractContextManager["Running"]):
         self._started: dict[str, float] = {}
 
     def __exit__(self, *_: object) -> None:
-        self._started.clear()
-        self._write()
+        with suppress(OSError):
+            self._path.unlink()
 
     def start(self, identity: str) -> None:
         """Record that a worker has received a trial."""

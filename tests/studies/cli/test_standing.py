@@ -46,6 +46,7 @@ def test_what_a_run_has_handed_out_is_running(study):
         running.start(made_up.TRIALS[4].identity)
         assert [*read_running(study)[1]] == [made_up.TRIALS[4].identity]
     assert read_running(study) is None
+    assert not (study / MARK).exists()
 
 
 def test_a_mark_that_outlived_its_process_is_passed_over(study):
