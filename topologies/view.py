@@ -73,7 +73,7 @@ class HierarchyView:
         depth = self.hierarchy.depth
         agents = f"{n} agent{'s' if n > 1 else ''}"
         count = format_count(sum(self.tries))
-        return f"{self.text}: {agents}, depth {depth}, {count} joint actions a step"
+        return f"{self.text}: {agents}, depth {depth}, {count} joint actions a step (exhaustive)"
 
 
 def view(

@@ -201,8 +201,8 @@ def _legend(rows: Sequence[CostRow], frame: pd.DataFrame) -> Iterator[str]:
         yield (
             "The formulas assume an exhaustive search (evaluator exact). If more than "
             f"{auto.exact_up_to} agents take part in a search, the default evaluator auto chooses "
-            "sampling or best-response, which try fewer joint actions. This concerns "
-            f"{', '.join(large)}."
+            "sampling or best-response, which try fewer joint actions, in this "
+            f"table for: {', '.join(large)}."
         )
 
 

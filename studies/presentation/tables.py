@@ -228,11 +228,12 @@ class SummaryTable:
         if self.seeds == 1:
             return ["Values of 1 seed, without intervals."]
         over = count(self.seeds, "seed") if self.seeds else "seeds"
-        usual = "Rates have Wilson intervals, others bootstrap intervals (too short if skewed)."
+        usual = (
+            "Rates have Wilson intervals. Other means have bootstrap intervals, which are too "
+            "short if values are skewed."
+        )
         if any(line.seeds < FEW for line in self.lines):
-            usual = (
-                f"Fewer than {FEW} seeds: rates have Wilson intervals, others Student intervals."
-            )
+            usual = f"Fewer than {FEW} seeds: rates have Wilson intervals, other means Student's."
         lines = [
             f"Means over {over} with 95% intervals.",
             *wrapped(self.remark or usual),
@@ -254,12 +255,13 @@ class SummaryTable:
 
     @property
     def csv(self) -> str:
-        """The whole table as CSV, with every digit."""
+        """The whole table as CSV, with every digit; p-values have no bounds."""
         columns: dict[str, Any] = {"condition": [line.condition for line in self.lines]}
         columns["seeds"] = [line.seeds for line in self.lines]
         for title in self.titles:
             parts = stack_estimates([line.estimates.get(title, UNKNOWN) for line in self.lines])
-            columns |= zip((title, f"{title} low", f"{title} high"), parts, strict=True)
+            names = (title, f"{title} low", f"{title} high")
+            columns |= zip(names[: 1 if title in (P_ADJUSTED, P_RAW) else 3], parts, strict=False)
         return in_csv(pd.DataFrame(columns))
 
     @property

@@ -50,23 +50,23 @@ def power_text(
     Examples
     --------
     >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
-    Power: 5 seeds cannot give an adjusted p below 0.05 among 2 comparisons,
+    Power: 5 seeds cannot give a p below 0.05 (p adjusted over 2 comparisons),
       whatever the outcome. At least 7 seeds are needed; a difference of 0.20 needs
       about 18.
     >>> print(*power_text(20, 1, 0.25, 0.2, "evaluation success"), sep="\n")
-    Power: 20 seeds detect a difference of 0.17 with power 0.80 in evaluation
-      success. A difference of 0.20 needs about 15 seeds.
+    Power: 20 seeds detect a difference of 0.17 in evaluation success with power
+      0.80. A difference of 0.20 needs about 15 seeds.
     """
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     detect = f"{counted} detect{'s' * (seeds == 1)}"
-    among = f" among {comparisons} comparisons" if comparisons > 1 else ""
+    adjusted = f" (p adjusted over {comparisons} comparisons)" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
     enough = seeds_for(smallest, deviation, comparisons) if smallest and deviation else None
     goal = format_number(smallest or 0.0)
     within = f" in {measure}" if measure else ""
     if seeds < needed:
         text = (
-            f"{counted} cannot give an adjusted p below {LEVEL:g}{among}{within}, whatever the "
+            f"{counted} cannot give a p below {LEVEL:g}{within}{adjusted}, whatever the "
             f"outcome. At least {needed} seeds are needed"
         )
         text += f"; a difference of {goal} needs about {enough}." if enough else "."
@@ -78,8 +78,7 @@ def power_text(
     else:
         least = detectable(deviation, seeds, comparisons)
         what = f"a difference of {format_number(least)}{unit}" if least < most else "no difference"
-        text = f"{detect} {what} with power {format_number(WANTED)}"
-        text += f"{among}{within}."
+        text = f"{detect} {what}{within} with power {format_number(WANTED)}{adjusted}."
         if enough and goal != format_number(least):
             text += f" A difference of {goal} needs about {enough} seeds."
     return wrapped(f"Power: {text}")
@@ -154,14 +153,14 @@ def independent_power_lines(
     deviation = deviation_of([own for pair in groups for own in pair], of_rates=False)
     counts = min(((len(own), len(base)) for own, base in groups), key=sorted)
     counted = f"{counts[0]} and {counts[1]} independent runs"
-    among = f" among {comparisons} comparisons" if comparisons > 1 else ""
+    adjusted = f" (p adjusted over {comparisons} comparisons)" if comparisons > 1 else ""
     within = f" in {measure}" if measure else ""
     least = detectable_independent(deviation or 1.0, counts, comparisons)
     if math.isinf(least):
-        text = f"{counted} cannot give an adjusted p below {LEVEL:g}{among}{within}."
+        text = f"{counted} cannot give a p below {LEVEL:g}{within}{adjusted}."
     elif deviation is None:
         text = f"unknown{within}, because the runs of each condition are all equal."
     else:
-        text = f"{counted} detect a difference of {format_number(least)} with power "
-        text += f"{format_number(WANTED)}{among}{within}."
+        text = f"{counted} detect a difference of {format_number(least)}{within} with power "
+        text += f"{format_number(WANTED)}{adjusted}."
     return wrapped(f"Power: {text}")

@@ -50,7 +50,7 @@ def test_a_picture_of_32_agents_names_all_and_fits_a_page(text: str, tmp_path: P
 
 def test_a_title_is_as_wide_as_the_picture_at_most(tmp_path: Path) -> None:
     hierarchy, groups = hierarchy_of("independent", 4)
-    title = "evenodd.py:even_odd: 8 agents, depth 2, 4,112 joint actions a step"
+    title = "evenodd.py:even_odd: 8 agents, depth 2, 4,112 joint actions a step (exhaustive)"
     draw(hierarchy, tmp_path / "picture.svg", bodies=groups, title=title)
     width = float(ElementTree.parse(tmp_path / "picture.svg").getroot().attrib["width"][:-2])
     drawn = TextPath((0, 0), title, size=10).get_extents().width

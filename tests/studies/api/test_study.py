@@ -38,7 +38,7 @@ def test_a_study_tells_its_conditions_table_and_notes(study) -> None:
     assert str(table).splitlines()[1].split()[0] == "default"
     assert table._repr_html_().count("<tr>") == 2
     assert "<th>default, 3 seeds</th>" in study._repr_html_()
-    assert "3 seeds cannot give an adjusted p below 0.05" in " ".join(study.power)
+    assert "3 seeds cannot give a p below 0.05" in " ".join(study.power)
     assert set(study.power) <= set(study.compare().notes), "one number of power for a study"
 
 

@@ -46,7 +46,7 @@ def test_show_as_json(said) -> None:
 
 def test_show_as_table(said) -> None:
     _, out, _ = said("show", "chain", "--agents", "4")
-    assert out.startswith("chain: 4 agents, depth 4, 340 joint actions a step\n")
+    assert out.startswith("chain: 4 agents, depth 4, 340 joint actions a step (exhaustive)\n")
     assert "1  robot1.left           3    256  robot1.right" in out
     assert max(map(len, out.splitlines())) <= 80
 
@@ -132,7 +132,9 @@ def test_robots_are_shown_as_they_are_arranged(said, line_world) -> None:
 def test_it_is_shown_over_the_agents_of_a_scenario(said) -> None:
     status, out, _ = said("show", "tree:2", "--scenario", "spread")
     assert status == 0
-    assert out.startswith("tree:2: 3 agents, depth 2, 135 joint actions a step\n")  # 5^3 + 2 x 5
+    assert out.startswith(
+        "tree:2: 3 agents, depth 2, 135 joint actions a step (exhaustive)\n"
+    )  # 5^3 + 2 x 5
     status, _, errors = said("show", "chain", "--scenario", "spread", "--agents", "3")
     assert (status, errors.count("\n")) == (2, 1)
     assert "chain: the scenario spread defines the agents" in errors

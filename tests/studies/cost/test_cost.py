@@ -448,4 +448,4 @@ def test_the_axis_of_operations_is_their_logarithm(said, agents, tmp_path, monke
 @pytest.mark.parametrize(("agents", "is_said"), [("5", False), ("5:6", True)])
 def test_where_the_default_evaluator_is_another_one_is_said(said, agents, is_said) -> None:
     out = said("--agents", agents, "--topology", "chain", "star", "independent", "best-response")[1]
-    assert ("This concerns chain, star." in " ".join(out.split())) == is_said
+    assert ("in this table for: chain, star." in " ".join(out.split())) == is_said

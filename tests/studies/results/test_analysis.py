@@ -217,4 +217,4 @@ def test_an_interval_that_seems_to_contradict_p_is_explained_once(
     found = Difference("a", "evaluation success", estimate, p, p, values)
     text = " ".join(" ".join(verdicts({"all": [found, found]})).split())
     assert text.count("seem to disagree about 0, p decides.") == is_explained
-    assert "with power 0.80 among 2 comparisons in evaluation success." in text
+    assert "in evaluation success with power 0.80 (p adjusted over 2 comparisons)." in text

@@ -129,7 +129,7 @@ def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
     text = " ".join(" ".join(verdict_lines(found)).split())
     assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
     said = " ".join(line.strip() for line in power_lines([d.sample for d in found]))
-    assert "5 seeds cannot give an adjusted p below 0.05 among 2 comparisons" in said
+    assert "5 seeds cannot give a p below 0.05 (p adjusted over 2 comparisons)" in said
     assert "At least 7 seeds are needed; a difference of 0.20 needs about" in said
 
 
@@ -229,6 +229,6 @@ def test_the_power_of_independent_runs_is_printed() -> None:
     text = " ".join(independent_power_lines(groups, 1, "score"))
     assert text.startswith("Power: 8 and 9 independent runs detect a difference of")
     few = " ".join(independent_power_lines([(np.arange(3.0), np.arange(3.0))], 1))
-    assert few == "Power: 3 and 3 independent runs cannot give an adjusted p below 0.05."
+    assert few == "Power: 3 and 3 independent runs cannot give a p below 0.05."
     equal = " ".join(independent_power_lines([(np.ones(8), np.zeros(8))], 1))
     assert "unknown, because the runs of each condition are all equal" in equal
