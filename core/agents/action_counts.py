@@ -8,7 +8,7 @@ import numpy as np
 
 from ..interface.agents import StateDict
 from ..numerics import AnyArray, FloatArray, IntArray
-from ..search.evaluator import NOTHING_GIVEN
+from ..search.evaluator import NO_AGENTS, NOTHING_GIVEN
 
 
 class ActionCounts:
@@ -52,12 +52,13 @@ class ActionCounts:
             return NOTHING_GIVEN
         return self.conditional[agent] / self.conditional[agent].sum(axis=2, keepdims=True)
 
-    def add(self, joint_action: IntArray) -> None:
-        """Count a joint action ``(n,)``."""
-        every = np.arange(len(joint_action))
-        self.totals[every, joint_action] += 1.0
+    def add(self, joint_action: IntArray, left: IntArray = NO_AGENTS) -> None:
+        """Count a joint action ``(n,)``, without the agents ``(k,)`` that have left."""
+        agents = np.delete(np.arange(len(joint_action)), left)
+        taken = joint_action[agents]
+        self.totals[agents, taken] += 1.0
         if self.conditional.size:
-            self.conditional[every[:, None], joint_action[:, None], every, joint_action] += 1.0
+            self.conditional[agents[:, None], taken[:, None], agents, taken] += 1.0
 
     def warm_start(self, former: ActionCounts, alike: Sequence[tuple[int, IntArray]]) -> None:
         """Start from counts of another team.

@@ -29,7 +29,7 @@ from ..search.evaluator import NO_AGENTS, Aggregation, DecisionContext, Evaluato
 from ..search.exploration import Explorer
 from .action_counts import ActionCounts
 from .team_search import TeamSearch
-from .views import FuzzyInputs, Views, agreement, senders_of, weights_by_agent
+from .views import FuzzyInputs, Views, senders_of, weights_by_agent
 
 
 class FuzzyAgents(Agents[FuzzyInputs]):
@@ -185,6 +185,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         If all agents receive all earlier actions, one search in the first stage may find them all.
         """
         (agent,) = inbox.agents.tolist()
+        inputs.decided.add(agent)
+        inputs.received += len(inbox.senders)
         if self.evaluator is None:
             return self.rng.integers(len(self.action_set), size=1)
         is_first = agent == self.search.hierarchy.order[0]
@@ -223,14 +225,13 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         if not inputs.explore or self.evaluator is None:
             return
         self.explorer.advance()
-        self.action_counts.add(joint_action)
+        self.action_counts.add(joint_action, self.search.left)
 
     def decision_costs(self, inputs: FuzzyInputs, joint_action: IntArray) -> Mapping[str, float]:
         """Return agreement and communication, for agents with views of their own."""
         if self.views is None:
             return {}
-        share = agreement(inputs.expected, joint_action)
-        return self.views.decision_costs(share, self.search.hierarchy)
+        return self.views.decision_costs(inputs, joint_action, self.search.left)
 
     def record_values(self, inputs: FuzzyInputs) -> None:
         """Keep the values of actions in this decision; each agent then searches on its own."""
@@ -267,6 +268,7 @@ class FuzzyAgents(Agents[FuzzyInputs]):
         left = inputs.left[self.members]
         taken = experience.decision.joint_action[self.members]
         reward = transition.reward
+        idle = np.flatnonzero([agent not in inputs.decided for agent in self.members.tolist()])
         if np.ndim(reward):
             reward = np.asarray(reward)[self.members]
         if transition.terminated and not transition.absorbing:
@@ -277,6 +279,8 @@ class FuzzyAgents(Agents[FuzzyInputs]):
             reward = self.mirror.reward(reward)
             left = self.mirror.states(left)
             taken = np.tile(taken, 2)
+            idle = np.append(idle, idle + len(self.members))
+        self.learner.idle = idle
         updates = self.learner.observe_decision(
             left, taken, states, reward, transition.terminated, experience.duration
         )

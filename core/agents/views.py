@@ -20,7 +20,7 @@ from ..interface.prediction import Prediction
 from ..learners.learner import LearnerSettings
 from ..numerics import FloatArray, IntArray
 from ..search.errors import Errors
-from ..search.evaluator import concerned
+from ..search.evaluator import NO_AGENTS, concerned
 
 UNKNOWN: FloatArray = np.zeros(0)
 """Weights of agents of another part, which are unknown."""
@@ -61,6 +61,10 @@ class FuzzyInputs:
     """``(n,)`` joint action, if one search has found the actions of all agents."""
     views: dict[int, OwnView] = field(default_factory=dict)
     """Own views by agent; empty if all agents share prediction and weights."""
+    decided: set[int] = field(default_factory=set)
+    """Agents that have decided; absent ones do not, and learn nothing."""
+    received: int = 0
+    """Number of received actions."""
     expected: dict[int, IntArray] = field(default_factory=dict)
     """Joint action that an agent expected when it decided, for agents with own views and plans."""
 
@@ -100,11 +104,11 @@ class Views:
         self._rows = rows
         hierarchy = context.hierarchy
         scenario = context.scenario
-        perceived = len(context.members) * (len(scenario.groups) - 1)
+        self._broadcast: FloatArray = np.full(len(hierarchy), len(scenario.groups) - 1.0)
         if isinstance(scenario, PartiallyObserved):
-            perceived = int(scenario.perceived[context.members].sum())
-        # Learners of action values do not predict and need only their own states.
-        self._broadcast = 0.0 if settings.values_actions else float(perceived)
+            self._broadcast = scenario.perceived.astype(float)
+        if settings.values_actions:  # they do not predict and need only their own states
+            self._broadcast = np.zeros(len(hierarchy))
         self._errors: Errors | None = None
         if settings.decision.errors is not None:
             valued = concerned(hierarchy, settings.decision.value_of)
@@ -118,13 +122,18 @@ class Views:
             views[agent] = shared.of(agent), weights_by_agent(self._rows, own)
         return views
 
-    def decision_costs(self, agreement: float, hierarchy: Hierarchy) -> Mapping[str, float]:
-        """Return agreement and communication of a decision by the names of `costs`."""
-        share = len(self._members) / len(hierarchy)  # the other parts add their shares
+    def decision_costs(
+        self, inputs: FuzzyInputs, joint_action: IntArray, left: IntArray
+    ) -> Mapping[str, float]:
+        """Return agreement and communication of a decision by the names of `costs`.
+
+        Agents that have `left` ``(k,)`` count for nothing.
+        """
+        share = len(self._members) / len(joint_action)  # the other parts add their shares
         spent = {
-            "agreement": agreement * share,
-            "received": float(sum(len(hierarchy.senders(i)) for i in self._members)),
-            "broadcast": self._broadcast,
+            "agreement": agreement(inputs.expected, joint_action, left) * share,
+            "received": float(inputs.received),
+            "broadcast": float(self._broadcast[sorted(inputs.decided)].sum()),
         }
         return {measure.name: spent[measure.name] for measure in self.costs}
 
@@ -134,7 +143,9 @@ def weights_by_agent(rows: list[int | None], theta: FloatArray) -> list[FloatArr
     return [UNKNOWN if row is None else theta[row] for row in rows]
 
 
-def agreement(expected: dict[int, IntArray], joint_action: IntArray) -> float:
+def agreement(
+    expected: dict[int, IntArray], joint_action: IntArray, left: IntArray = NO_AGENTS
+) -> float:
     """Return the share of other agents' actions that agents expected rightly, mean over agents.
 
     Parameters
@@ -143,20 +154,22 @@ def agreement(expected: dict[int, IntArray], joint_action: IntArray) -> float:
         Joint action ``(n,)`` that an agent expected when it decided.
     joint_action
         ``(n,)`` joint action that was then taken.
+    left
+        ``(k,)`` agents that have left, whose actions all know.
 
     Examples
     --------
     >>> agreement({0: np.array([1, 2, 0]), 1: np.array([1, 1, 3])}, np.array([1, 1, 3]))
     0.5
     """
-    n = len(joint_action)
-    if n == 1 or not expected:
+    n_others = len(joint_action) - len(left) - 1
+    if n_others < 1 or not expected:
         return 1.0
     right = 0
     for agent, plan in expected.items():
         hit = plan == joint_action
-        right += int(hit.sum()) - int(hit[agent])
-    return right / (len(expected) * (n - 1))
+        right += int(np.delete(hit, left).sum()) - int(hit[agent])
+    return right / (len(expected) * n_others)
 
 
 def senders_of(settings: LearnerSettings, hierarchy: Hierarchy) -> list[list[int]]:

@@ -73,6 +73,9 @@ class BatchTD(Learner):
         If the rule base is too large for a dense solution.
     """
 
+    values_decisions: ClassVar[bool] = False
+    """Whether it stores decisions, and not the states in which they are made."""
+
     def __init__(self, settings: Any, rules: RuleBase, rows: IntArray) -> None:
         if rules.n_rules > MOST_RULES:
             raise ValueError(
@@ -119,8 +122,12 @@ class BatchTD(Learner):
     ) -> int:
         """Store an after-state; regress after every `interval` decisions."""
         n = len(states)
+        if self._is_running and not self.values_decisions:
+            self._experience["follower"][-1][-n:][self.idle] = CUT_OFF
         self._n_states += n
         follower = np.full(n, TERMINAL) if terminated else self._n_states + np.arange(n)
+        if terminated or self.values_decisions:
+            follower[self.idle] = CUT_OFF
         step = {
             "rows": self.rows,
             "states": states.copy(),
@@ -187,7 +194,7 @@ class BatchTD(Learner):
         k = self.rules.n_rules
         gram, begin = self._summed.get(row, (self.settings.ridge * np.eye(k), 0))
         # The last after-state is added once its successor is known.
-        end = len(known) if known[-1] else len(known) - self._counts[row]
+        end = len(known) - self._is_running * self._counts[row]
         add_gram(gram, active[begin:end], strengths[begin:end], known[begin:end])
         self._summed[row] = gram, end
         return known, lambda theta: row_values(theta, active, strengths), solver(gram)

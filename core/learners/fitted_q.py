@@ -117,6 +117,8 @@ class FittedQ(BatchTD, Evaluator):
     added to them once.
     """
 
+    values_decisions = True
+
     def __init__(self, settings: FittedQSettings, rules: RuleBase, rows: IntArray) -> None:
         super().__init__(settings, rules, rows)
         self.counts = Counts()

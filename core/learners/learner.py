@@ -43,6 +43,9 @@ class Learner(ABC):
 
     theta: FloatArray
     """``(n_rows, n_rules)`` consequent weights."""
+    idle: IntArray = np.zeros(0, dtype=np.int64)
+    """``(k,)`` indices of agents that did not decide, because they were absent, in the step that
+    is learned from. They learn nothing from it."""
 
     def begin_episode(self) -> None:  # noqa: B027 - optional
         """Begin an episode: clear traces of the last one."""

@@ -37,7 +37,8 @@ class SparseCooperative(OneStep):
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Update for the step from the previous states to these, each agent by its share."""
-        shared = reward / len(states) if np.ndim(reward) == 0 else reward
+        n_deciding = max(len(states) - len(self.idle), 1)
+        shared = reward / n_deciding if np.ndim(reward) == 0 else reward
         return super().observe(states, shared, terminated)
 
 
@@ -65,7 +66,8 @@ class ValueDecomposition(SparseCooperative):
         self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
     ) -> FloatArray:
         errors = super()._errors(states, rewards, entered)
+        errors[self.idle] = 0.0
         return np.full(len(states), errors.sum())
 
     def _lengths(self, states: FloatArray) -> FloatArray:
-        return super()._lengths(states).sum()
+        return np.delete(super()._lengths(states), self.idle).sum()

@@ -198,6 +198,7 @@ class TDLambda(Online):
             lengths = self.rules.squared_lengths(states)
         discount = 0.0 if entered is None else self.discount
         step_sizes = self.settings.step_size / lengths
+        step_sizes[self.idle] = 0.0
         decay = self.discount * self.settings.trace_decay
         # The states left are those entered before: their features are computed once.
         active = self._entered or self.rules.active(states)
@@ -207,6 +208,7 @@ class TDLambda(Online):
         td_lambda_update(
             self.weights, self.rows, self.trace, active, active_next, rewards, constants
         )
+        self.trace[self.idle] = 0.0
         if self.settings.averaging > 1:
             self.updates += 1.0
             rate = 1.0 / min(float(self.updates), self.settings.averaging)
@@ -227,6 +229,7 @@ class OneStep(Online):
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         errors = self._errors(states, rewards, entered)
         steps = self.settings.step_size * errors / self._lengths(states)
+        steps[self.idle] = 0.0
         self.rules.add_features(self.weights, self.rows, states, steps)
         return self.theta.size
 
@@ -313,7 +316,8 @@ class FMQ(OneStep):
         super()._update(states, rewards, entered)
         active, strengths = self.rules.active(states)
         fired = active[np.arange(len(states)), strengths.argmax(axis=1)]
-        for row, rule, reward in zip(self.rows, fired, rewards, strict=True):
+        decided = [np.delete(array, self.idle) for array in (self.rows, fired, rewards)]
+        for row, rule, reward in zip(*decided, strict=True):
             self.visits[row, rule] += 1.0
             if reward > self.greatest[row, rule]:
                 self.greatest[row, rule], self.hits[row, rule] = reward, 0.0

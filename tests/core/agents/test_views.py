@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from acting import look
 
+from nested_agents.core.agents.action_counts import ActionCounts
 from nested_agents.core.agents.fuzzy import FuzzyAgents
 from nested_agents.core.agents.team import Team
 from nested_agents.core.agents.views import agreement
+from nested_agents.core.hierarchy.failures import AbsentAgents, LostMessages
 from nested_agents.core.hierarchy.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.search.errors import Errors, ErrorSettings
@@ -52,6 +54,7 @@ def test_agreement_by_hand() -> None:
     assert agreement({0: joint, 1: joint}, joint) == 1.0
     assert agreement({0: np.array([0, 2, 0])}, joint) == 0.5  # its own action does not count
     assert agreement({0: np.array([1, 0, 0]), 2: joint}, joint) == 0.5
+    assert agreement({0: np.array([1, 2, 0])}, joint, np.array([1])) == 0.0  # its action is known
 
 
 def test_silent_agents_without_errors_do_what_they_did(world) -> None:
@@ -101,3 +104,23 @@ def test_a_common_plan_of_agents_that_differ_is_refused(world) -> None:
     with pytest.raises(ValueError, match="so their plans differ") as error:
         team_of(world, errors=ErrorSettings(), plan="common")
     assert "\n" not in str(error.value)
+
+
+def test_costs_are_those_of_the_agents_that_decide(world) -> None:
+    """Of three in a chain the first is absent: two states of others each, one message."""
+    settings = BatchTDSettings(decision=DecisionSettings(errors=ErrorSettings(weights=0.1)))
+    chain = Hierarchy(world.agents, list(pairwise(world.agents)))
+    first = world.agents[0]
+    costs = []
+    for failures in ([], [AbsentAgents(agents=first)], [LostMessages(agents=first)]):
+        team = Team(settings, world, chain, SEED, failures)
+        team.act(look(world))
+        costs.append((team.decision_costs["received"], team.decision_costs["broadcast"]))
+    assert costs == [(3, 6), (1, 4), (1, 6)]
+
+
+def test_agents_that_have_left_are_not_counted() -> None:
+    counts = ActionCounts(3, 2, is_conditional=True)
+    counts.add(np.array([0, 1, 1]), np.array([1]))
+    assert counts.totals.tolist() == [[2, 1], [1, 1], [1, 2]]
+    assert counts.conditional.sum() == 3 * 2 * 3 * 2 + 4
