@@ -20,6 +20,7 @@ from ..interface.scenario import Transition
 from ..learners import check_prediction
 from ..learners.learner import CORE, TeamSettings
 from ..numerics import AnyArray, FloatArray, IntArray
+from ..plugins.words import show
 from ..search.exploration import warm_start_refusal
 
 
@@ -109,6 +110,8 @@ class PeerAgents(Agents[PeerInputs]):
         self.peer: Peer = settings.build(context.scenario, context.seed, *hierarchies)
         self.rng = self.peer.rng
         self.is_stochastic = self.peer.is_stochastic
+        self._shape = (len(context.scenario.agents),)
+        self._n_actions = len(context.scenario.action_set)
 
     def reset(self, episode: int, *, learn: bool) -> None:
         """Start an episode."""
@@ -117,7 +120,18 @@ class PeerAgents(Agents[PeerInputs]):
 
     def observe(self, seen: Observation, *, explore: bool) -> PeerInputs:
         """Return the inputs of a decision."""
-        return cache(lambda: np.asarray(self.peer.act(seen, explore=explore)))
+        return cache(lambda: self._checked(self.peer.act(seen, explore=explore)))
+
+    def _checked(self, joint_action: object) -> IntArray:
+        """Return a joint action of the peer, or refuse it."""
+        actions = np.asarray(joint_action)
+        is_whole = actions.shape == self._shape and actions.dtype.kind in "iu"
+        if not is_whole or actions.min() < 0 or actions.max() >= self._n_actions:
+            raise ValueError(
+                f"{type(self.peer).__name__}.act returns {show(joint_action)}, allowed: a whole "
+                f"number from 0 to {self._n_actions - 1} for each of {self._shape[0]} agents"
+            )
+        return actions
 
     def act(self, inputs: PeerInputs, inbox: Inbox) -> IntArray:
         """Return the actions of a stage; the first stage chooses the joint action."""

@@ -18,6 +18,7 @@ from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.networks.agents import CentralPPOAgents
+from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -393,6 +394,17 @@ def test_a_learner_of_ones_own_is_given_the_hierarchy_if_it_asks(
         "parents" if uses else None
     )
     assert [line[:18] for line in remarks(spec)] == ([] if uses else ["topology: left out"])
+
+
+@pytest.mark.parametrize("answer", ["[0, -1, 0, 0]", "[0.0, 1.7, 0, 0]", "[0, 9, 0, 0]", "[0]"])
+def test_actions_that_a_learner_of_ones_own_has_not_are_refused(answer: str) -> None:
+    source = MINE.replace("USES", "False").replace("[0] * len(seen.states)", answer)
+    with Sources(texts={"mine.py": source}).active():
+        scenario = LineUpSettings(carts=CARTS).build()
+        settings = LEARNERS.model("mine.py:Mine").model_validate({"kind": "mine.py:Mine"})
+        team = Team(settings, scenario, Hierarchy(scenario.agents, []), np.random.SeedSequence(0))
+        with pytest.raises(ValueError, match=r"^Mine\.act returns \[.*\], allowed: a whole number"):
+            team.act(look(scenario))
 
 
 @pytest.mark.slow
