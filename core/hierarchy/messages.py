@@ -165,13 +165,16 @@ class Messages:
                 joint_action[self._masks[k]] = actions[k]
         return joint_action
 
-    def failing(self, episode: int, steps: int) -> BoolArray:
-        """Return whether messages of an agent fail in the first steps of an episode.
+    def failing(self, episode: int, steps: int) -> IntArray:
+        """Return what fails in the first steps of an episode ``(steps, n)``.
 
-        The array has shape ``(steps, n)``.
+        It is 0 for an agent without failures, 1 if its messages fail, and 2 if it is absent.
         """
         active = [[f.lasts(episode, step) for f in self.failures] for step in range(steps)]
-        return np.array(active) @ np.array(self._masks)
+        absences = [isinstance(f, AbsentAgents | LeftAgents) for f in self.failures]
+        named = np.array(self._masks) * np.add(absences, 1)[:, None]
+        failing: IntArray = (np.array(active)[:, :, None] * named).max(axis=1)
+        return failing
 
     def _activate_failures(self) -> None:
         now = self._episode, self._step

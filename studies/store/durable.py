@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 Recording = dict[str, "NDArray[Any]"]
 """Arrays of one episode of T steps by name: those that the scenario's ``recorded`` names, each
 ``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if each agent has its own reward; those that
-its ``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)`` if messages can fail."""
+its ``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)`` if messages can fail, 1
+while they do and 2 while an agent is absent."""
 
 TEAM = "team"
 """Name of a trained team's arrays among the names of recorded episodes."""

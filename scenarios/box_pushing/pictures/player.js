@@ -205,11 +205,13 @@
     const turned = Math.abs(Math.atan2(Math.sin(turn), Math.cos(turn))) * 180 / Math.PI;
     const failed = shown.shape.agents.filter((_, i) => shown.failed[i][now]);
     const names = shown.talking > shown.robots.length ? shown.shape.agents : shown.robots.map((_, r) => `robot${r + 1}`);
-    const silent = names.filter((_, i) => shown.silent[i]?.[now]);
+    const silent = names.filter((_, i) => shown.silent[i]?.[now] === 1);
+    const absent = names.filter((_, i) => shown.silent[i]?.[now] === 2);
     const end = now < shown.steps ? "" : shown.reached ? " – goal reached" : " – goal not reached";
     const text = `step ${now} of ${shown.steps}, ${(now * shown.dt).toFixed(1)} s: box ${(100 * away).toFixed(0)} cm ` +
       `from the goal, turned ${turned.toFixed(0)}°${failed.length ? `; failed: ${failed.join(", ")}` : ""}` +
-      `${silent.length ? `; messages fail: ${silent.join(", ")}` : ""}${end}`;
+      `${silent.length ? `; messages fail: ${silent.join(", ")}` : ""}` +
+      `${absent.length ? `; absent: ${absent.join(", ")}` : ""}${end}`;
     at("moment").textContent = text;
     scrub.setAttribute("aria-valuetext", text);
   }

@@ -18,7 +18,7 @@ from matplotlib.patches import Circle, Patch, PathPatch, Polygon, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.transforms import Affine2D
 
-from ....core.numerics import BoolArray, FloatArray
+from ....core.numerics import FloatArray, IntArray
 from ...movies import Pixels, Scene, film, save_picture
 from ..world.boxes import BoxSpec, box_for
 from ..world.robots import robot_for
@@ -70,21 +70,25 @@ class BoxScene(Scene):
         self._trail(box, step, BOX_COLOR)
         silent = self._silent(step)
         for r in range(len(silent)):
-            self._add_robot(r, step, is_silent=bool(silent[r]))
+            self._add_robot(r, step, is_silent=silent[r] > 0)
         gap = float(np.hypot(*(box[step] - self.recording["goal_pose"])[:2]))
-        names = ", ".join(str(r + 1) for r in np.flatnonzero(silent))
+        fails, absent = (
+            ", ".join(str(r + 1) for r in np.flatnonzero(silent == kind)) for kind in (1, 2)
+        )
         self.axes.set_title(
             f"step {step}, {step * float(self.recording['dt']):.1f} s: box {100 * gap:.0f} cm "
-            f"from the goal{f'; messages of robots {names} fail' * bool(names)}",
+            f"from the goal{f'; messages of robots {fails} fail' * bool(fails)}"
+            f"{f'; agents of robots {absent} are absent' * bool(absent)}",
             loc="left",
             fontsize=11,
         )
 
-    def _silent(self, step: int) -> BoolArray:
-        """Return whether the messages of each robot fail ``(M,)``."""
+    def _silent(self, step: int) -> IntArray:
+        """Return 1 for robots ``(M,)`` whose messages fail, 2 if one of their agents is absent."""
         robots = self.recording["robot_poses"].shape[1]
         fail = self.recording.get("messages_fail", np.zeros((step + 1, robots)))
-        return fail[step].reshape(robots, -1).any(axis=1)
+        silent: IntArray = fail[step].astype(int).reshape(robots, -1).max(axis=1)
+        return silent
 
     def _add_box(self, pose: FloatArray, **style: object) -> None:
         length = 0.18 * np.sqrt(self.box.area)

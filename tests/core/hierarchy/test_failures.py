@@ -129,8 +129,10 @@ def test_the_same_seed_loses_the_same_messages() -> None:
 def test_whose_messages_fail_when_is_known_beforehand() -> None:
     silent = LostMessages(agents="b", step=1, end_episode=0, end_step=2)
     made = messages(silent, NoisyMessages(agents=["a"], episode=1))
-    assert made.failing(0, 3).astype(int).tolist() == [[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]]
-    assert made.failing(1, 1).astype(int).tolist() == [[1, 0, 0, 0]]
+    assert made.failing(0, 3).tolist() == [[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]]
+    assert made.failing(1, 1).tolist() == [[1, 0, 0, 0]]
+    absent = messages(AbsentAgents(agents="b"), NoisyMessages(agents="*"), LeftAgents(agents="c"))
+    assert absent.failing(0, 1).tolist() == [[1, 2, 2, 1]]
     assert LostMessages(agents=["a", "c*"], probability=0.5).text == "lost: a, c*, probability 0.5"
 
 

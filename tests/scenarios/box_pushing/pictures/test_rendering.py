@@ -45,7 +45,10 @@ def test_a_picture_of_one_moment(recording, tmp_path: Path) -> None:
 def test_robots_whose_messages_fail_have_a_ring(recording) -> None:
     fine = picture(recording, 0)
     recording["messages_fail"] = np.array([[False, False, True, False]] * 5)
-    assert (picture(recording, 0) != fine).any()
+    fails = picture(recording, 0)
+    assert (fails != fine).any()
+    recording["messages_fail"] = np.array([[0, 0, 2, 0]] * 5)  # absent, in the title
+    assert (picture(recording, 0) != fails).any()
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
