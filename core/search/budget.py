@@ -35,16 +35,20 @@ def divide(budget: int, needs: Sequence[int]) -> list[int]:
     return shares
 
 
+class BudgetError(ValueError):
+    """A budget is too small for any decision of a team."""
+
+
 def check_budget(budget: int | None, least: int, search: str) -> None:
     """Refuse a budget below the `least` number of joint actions that a search can try.
 
     Raises
     ------
-    ValueError
+    BudgetError
         One line with the key, the value and the least possible budget.
     """
     if budget is not None and budget < least:
-        raise ValueError(
+        raise BudgetError(
             f"learner.decision.budget = {budget}: {search} tries at least {least:,} joint actions "
             f"in a decision of this team, allowed: {least} or more"
         )

@@ -1,8 +1,9 @@
-"""Search methods of the teams of a study that change with size."""
+"""Search methods of the teams of a study that change with size, and sizes that cannot run."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 
+from ...core.search.budget import BudgetError
 from ..cost.profile import search_method
 from ..laws.size_axis import SizeAxis
 from ..results.results import Results
@@ -20,7 +21,7 @@ def method_remarks(
     size: str | None,
     predict: Sequence[int],
 ) -> tuple[str, ...]:
-    """Return a sentence if the search method of a group of conditions changes with size.
+    """Return sentences if a search method changes with size, or a predicted size cannot run.
 
     A team of each condition and of each predicted size is built to find its method. A study with
     untrusted files, or one that is known by its table alone, has no methods.
@@ -29,6 +30,7 @@ def method_remarks(
     groups = axis.groups()
     steps: list[tuple[float, str, str]] = []
     changing: list[str] = []
+    refused: dict[str, str] = {}
     for group, sizes in groups.items():
         teams = {n: settings[condition] for condition, n in sizes.items() if condition in settings}
         for n in map(float, predict if teams else ()):
@@ -37,18 +39,27 @@ def method_remarks(
                 teams.setdefault(n, _resized(largest, axis.key, min(int(n), MAX_BUILT)))
         smallest: dict[str, float] = {}
         for n in sorted(teams):
-            with suppress(ValueError, ImportError):
+            try:
                 smallest.setdefault(search_method(arrange(teams[n], 0).team), n)
+            except BudgetError as error:
+                refused.setdefault(f"{n:g}", str(error))
+            except (ValueError, ImportError):
+                continue
         if len(smallest) > 1:
             changing.append(group)
             steps += [(n, group, method) for method, n in smallest.items()]
+    remarks = tuple(
+        f"{n} {axis.name} cannot run, so that a prediction has no meaning there: {error}."
+        for n, error in refused.items()
+    )
     if not changing:
-        return ()
+        return remarks
     changes = dict.fromkeys(f"{method} from {n:g} {axis.name}" for n, _, method in sorted(steps))
     head = "" if len(changing) == len(groups) else f"{', '.join(changing)}: "
     return (
         f"{head}The search method changes with size ({', '.join(changes)}), so that one law "
         "describes several methods; learner.decision.evaluator sets one for all.",
+        *remarks,
     )
 
 

@@ -313,12 +313,20 @@ def table_of(text: str, source: str) -> TomlTable:
     return {"title": comment, **table} if comment else table
 
 
+SENTENCE_END = re.compile(r"(?<=[?!])\s|(?<!\b[A-Z])(?<!\bet al)(?<!\bFig)(?<!\bEq)\.(?:\s|$)")
+"""End of a sentence; a period after an initial, *et al*, *Fig* or *Eq* ends none."""
+
+
 def first_sentence(text: str) -> str:
     r"""Return the first sentence of the comment at the top of a TOML text; empty without one.
 
+    It does not end after an initial or an abbreviation.
+
     >>> first_sentence("# A wheel fails: do two robots cope? See Fig. 5.\nstudy = 'scaling'")
     'A wheel fails: do two robots cope?'
+    >>> first_sentence("# The chain of J. N. Smith et al. (2010), Fig. 5. Run again.")
+    'The chain of J. N. Smith et al. (2010), Fig. 5'
     """
     lines = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
     comment = " ".join(line[1:].strip() for line in lines if not line.startswith("#:"))
-    return re.split(r"(?<=[?!])\s|\.(?:\s|$)", comment, maxsplit=1)[0].rstrip(":").strip()
+    return SENTENCE_END.split(comment, maxsplit=1)[0].rstrip(":").strip()

@@ -204,7 +204,7 @@ def export(directory: Path, form: Files, out: Path | None, overwrite: bool, trus
     """Write one file with a row for every episode, and one with a row for every trial.
 
     DIR is the folder of the study. JSON is one small file of spec, seeds and rounded measures, to
-    publish with a paper; the command table reads it.
+    publish with a paper; the command table reads it. For LaTeX use table --format latex.
     """
     folder = directory / "export" if out is None else out
     if trust:

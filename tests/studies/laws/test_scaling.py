@@ -250,6 +250,16 @@ def test_a_search_method_that_changes_is_remarked(tmp_path) -> None:
         assert "exact from 1 carts, best-response from 12 carts" in said
 
 
+def test_a_prediction_beyond_the_budget_is_remarked(tmp_path) -> None:
+    budget = {"decision": {"budget": 40}}
+    spec = {**CARTS, "preset": "default", "learner": budget, "sweep": {"scenario.carts": [1, 2, 3]}}
+    study = na.run(spec, tmp_path / "a", jobs=1, progress=False)
+    said = " ".join(na.scaling_law(study, predict=[4, 64]).analysis.remarks)
+    assert "64 carts cannot run" in said
+    assert "learner.decision.budget = 40" in said
+    assert "4 carts cannot run" not in said.replace("64 carts", "")
+
+
 def table(path, sizes, of, seeds=4):
     """Write a table of scores whose means are those of a law; deviations of seeds sum to zero."""
     deviations = [0.9, 0.95, 1.05, 1.1]
