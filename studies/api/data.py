@@ -33,7 +33,7 @@ from ..results.results import Results
 from ..spec.conditions import ConditionSettings
 from ..spec.controls import control_lines
 from ..spec.outline import StudyOutline
-from ..spec.tables import SpecTable, TomlTable
+from ..spec.tables import SpecTable, TomlTable, is_named_after
 from .comparison import Comparison
 
 if TYPE_CHECKING:
@@ -181,6 +181,8 @@ class StudyData:
         own_measure, default_by = self._defaults
         by = by or default_by or (None if reference else key_beside_size(self.results))
         key = None if by == "condition" else by
+        if key is not None and is_named_after(key, self.results.columns, self._settings):
+            key = "name"
         usual = default_measure(self.results) if phase is None else self.results.main.name
         name = measure or own_measure or usual
         compared = compare_conditions(self.results, name, phase, key, reference)

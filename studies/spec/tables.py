@@ -234,6 +234,24 @@ def key_named(option: str, name: str, keys: Iterable[str]) -> str:
     raise SpecError(f"{option} = {name!r}: {hint}")
 
 
+def is_named_after(
+    by: str, columns: Mapping[str, SpecTable], settings: Mapping[str, SpecTable]
+) -> bool:
+    """Return whether the names of overrides stand for the values of one key, which is not swept.
+
+    >>> settings = {c: {"topology": {"kind": c}, "steps": 5} for c in ("chain", "star")}
+    >>> is_named_after("topology", {c: {"name": c} for c in settings}, settings)
+    True
+    """
+    swept = {key for row in columns.values() for key in row}
+    if "name" not in swept or any(by in (key, key.rpartition(".")[2]) for key in swept):
+        return False
+    known = [dict(flat(settings[c])) for c in columns if c in settings]
+    every = {key for own in known for key in own} - swept
+    varied = {key for key in every if len({str(own.get(key)) for own in known}) > 1}
+    return bool(varied) and all(f".{by}." in f".{key}." for key in varied)
+
+
 def label_but(columns: SpecTable, keys: Collection[str]) -> str:
     """Return the label that a condition of these columns would have without some swept keys.
 
