@@ -20,7 +20,7 @@ from ..catalogue.experience import stops
 from ..catalogue.study import load_study
 from ..errors import WIDTH, SpecError
 from ..presentation.progress import count, duration
-from ..results.power import SMALLEST, USUAL_DEVIATION
+from ..results.power import OUTCOME_DEVIATION, SMALLEST, USUAL_DEVIATION
 from ..results.power_text import planned_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
@@ -122,7 +122,7 @@ def plan(
         Number of trials that run at a time; default: one per core.
     deviation
         Assumed standard deviation of the paired differences of single seeds; default: 0.25 for
-        success rates, unknown for returns.
+        success rates, 0.5 in a study of recovery, unknown for returns.
     smallest
         Smallest difference of interest; default: 0.2 for success rates, none for returns.
     timed
@@ -137,12 +137,15 @@ def plan(
     if jobs is not None:
         check_jobs(jobs)
     measure = main_measure(examine(spec))
+    with spec.sources.active():
+        study = load_study(spec.study)
     for name, value in (("deviation", deviation), ("smallest", smallest)):
         if value is not None and not 0.0 < value <= (1.0 if measure.is_rate else np.inf):
             maximum = " and at most 1" if measure.is_rate else ""
             raise SpecError(f"--{name} {value:g}: must be above 0{maximum}")
     if measure.is_rate:
-        deviation = deviation or USUAL_DEVIATION
+        is_of_recovery = "onset" in study.NUMBERS
+        deviation = deviation or (OUTCOME_DEVIATION if is_of_recovery else USUAL_DEVIATION)
         smallest = smallest or SMALLEST
     elif deviation is None and smallest is not None:
         raise SpecError(f"--smallest {smallest:g}: for returns, give --deviation, too")
@@ -151,7 +154,7 @@ def plan(
     n_conditions = len(spec.conditions())
     seconds = None
     with spec.sources.active():
-        comparisons = load_study(spec.study).comparisons(spec)
+        comparisons = study.comparisons(spec)
     if timed:
         with spec.sources.active():
             costs = [pilot(trial) for trial in trials[:n_conditions]]

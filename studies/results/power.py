@@ -29,6 +29,8 @@ SMALLEST = 0.2
 USUAL_DEVIATION = 0.25
 """Standard deviation of the paired differences of success rates that is supposed before any are
 known. In the published studies of 20 and 30 seeds nine conditions in ten have less."""
+OUTCOME_DEVIATION = 0.5
+"""The same of outcomes of whole seeds, 0 or 1: whether a seed recovers."""
 SUPPOSED = 4.0
 """Number of seeds of `USUAL_DEVIATION` that are added, because a few equal seeds say little."""
 RATES = 1.07

@@ -138,7 +138,8 @@ def tune(
     "--deviation",
     type=float,
     metavar="SD",
-    help="Assumed standard deviation of differences of seeds; default: 0.25 for success rates.",
+    help="Assumed standard deviation of differences of seeds; default: 0.25 for success rates, "
+    "0.5 in a study of recovery.",
 )
 @click.option(
     "--smallest",

@@ -10,6 +10,7 @@ from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.progress import duration
 from nested_agents.studies.trials.trial import trials_of
+from research import SPECS
 
 SPEC = na.Spec(
     seeds=5, episodes=4, steps=20, evaluation=2, learner={"kind": "td-lambda"},
@@ -133,3 +134,9 @@ def test_a_plan_counts_decisions():
     text = str(na.plan(table))
     assert "each 1,000,000,000 decisions in episodes of up to 10 steps" in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_recovery_is_an_outcome_of_a_whole_seed() -> None:
+    spec = SPECS / "wheel-failure-poses.toml"
+    assert na.plan(spec, timed=False).deviation == 0.5
+    assert na.plan(spec, timed=False, deviation=0.3).deviation == 0.3
