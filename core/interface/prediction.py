@@ -103,18 +103,35 @@ UNPREDICTED = Unpredicted()
 """The only instance."""
 
 
+def states_of(prediction: Prediction, agent: int, joint_actions: IntArray) -> FloatArray:
+    """Return the predicted states ``(m, d)`` of an agent for joint actions ``(m, n)``.
+
+    Raises
+    ------
+    ValueError
+        If they are not finite.
+    """
+    return _finite(prediction.states(agent, joint_actions), f"states of agent {agent}", prediction)
+
+
 def rewards_of(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
     """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``.
 
     Raises
     ------
     ValueError
-        If none are predicted.
+        If none are predicted, or they are not finite.
     """
     rewards = prediction.rewards(joint_actions)
     if rewards is None:
         raise ValueError(f"{type(prediction).__name__} predicts no rewards")
-    return rewards
+    return _finite(rewards, "rewards", prediction)
+
+
+def _finite(values: FloatArray, what: str, prediction: Prediction) -> FloatArray:
+    if not np.isfinite(values).all():
+        raise ValueError(f"{type(prediction).__name__}: predicted {what} are not finite")
+    return values
 
 
 class Assumptions(NamedTuple):
@@ -184,6 +201,6 @@ def states_by_group(
     if states is not None:
         return states
     agents = range(joint_actions.shape[1])
-    each = np.stack([np.array(prediction.states(i, joint_actions)) for i in agents])
+    each = np.stack([np.array(states_of(prediction, i, joint_actions)) for i in agents])
     firsts = [group[0] for group in groups]
     return each[:, :, :n_own], each[firsts, :, n_own:]

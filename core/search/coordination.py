@@ -25,7 +25,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..interface.prediction import Prediction, rewards_of
+from ..interface.prediction import Prediction, rewards_of, states_of
 from ..numerics import FloatArray, IntArray
 from .coordination_graphs import Elimination, MaxPlus
 from .enumeration import combinations
@@ -141,7 +141,7 @@ class Coordination(Aggregation):
             return np.zeros(shape)
         joint = context.joint_action[None].repeat(len(tried), axis=0)
         joint[:, list(scope)] = tried
-        states = context.prediction.states(agent, joint)
+        states = states_of(context.prediction, agent, joint)
         return self.rules.values(weights, states).reshape(shape)
 
 

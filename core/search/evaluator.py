@@ -15,7 +15,7 @@ import numpy as np
 
 from ..hierarchy.hierarchy import Hierarchy
 from ..interface.agents import Counts
-from ..interface.prediction import Exploring, Prediction, rewards_of, states_by_group
+from ..interface.prediction import Exploring, Prediction, rewards_of, states_by_group, states_of
 from ..numerics import FloatArray, IntArray
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import PartSettings
@@ -310,7 +310,7 @@ class Aggregation(Evaluator):
         def values() -> FloatArray:
             if len(concerned) > 1:
                 return self.mean(self.pooled(context), prediction, joint_actions)
-            states = prediction.states(context.agent, joint_actions)
+            states = states_of(prediction, context.agent, joint_actions)
             return self.rules.values(context.own_weights, states)
 
         return self.combine(lambda: rewards_of(prediction, joint_actions), values)

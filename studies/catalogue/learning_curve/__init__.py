@@ -7,6 +7,7 @@ one that has the reward function distinguishes it from planning with the predict
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,7 +62,7 @@ def metrics_of(
     """Return the columns of the table, given the measures of an episode and their number.
 
     The main measure has columns for the first and last block of training and for the evaluation;
-    measures that are no rates have one for the last block.
+    measures that are no rates have one for the last block, whose heading says so.
     """
     title = main.heading
     return (
@@ -69,7 +70,11 @@ def metrics_of(
         (last_title(title, episodes), main, "last"),
         (f"evaluation {title}", main, "evaluation"),
         ("evaluation steps", steps, "evaluation"),
-        *((m.heading, m, "last") for m in measures if m.name != SUCCESS.name and not m.is_rate),
+        *(
+            (replace(m, title=last_title(m.title, episodes)).heading, m, "last")
+            for m in measures
+            if m.name != SUCCESS.name and not m.is_rate
+        ),
     )
 
 

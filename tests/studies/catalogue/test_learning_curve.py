@@ -36,11 +36,11 @@ def test_the_table_takes_the_ends_of_training_and_the_evaluation():
     assert values["success first 5"] == 0.0
     assert values["success last 5"] == 1.0
     assert values["evaluation success"] == 1.0
-    assert values["final distance [m]"] == np.mean([7, 8, 9, 10, 11])
+    assert values["final distance last 5 [m]"] == np.mean([7, 8, 9, 10, 11])
     assert float(never.estimates["success last 5"].value) == 0.0
     assert list(learns.estimates) == [
         "success first 5", "success last 5", "evaluation success", "evaluation steps",
-        "final distance [m]", "time in contact",
+        "final distance last 5 [m]", "time in contact last 5",
     ]  # fmt: skip
 
 
@@ -53,8 +53,8 @@ def test_a_measure_of_one_condition_has_a_panel_with_its_curve_alone():
     assert followed["final orientation error [deg]"] == ["learns"]
     assert followed["success"] == ["learns", "never"]
     learns, never = (line.estimates for line in analysis.table)
-    assert float(learns["final orientation error [deg]"].value) == 20.0
-    assert "final orientation error [deg]" not in never
+    assert float(learns["final orientation error last 5 [deg]"].value) == 20.0
+    assert "final orientation error last 5 [deg]" not in never
     panels = {axes.get_title(loc="left"): axes for axes in draw(analysis)["learning-curves"].axes}
     assert len(panels["final orientation error [deg]"].lines) < len(panels["success"].lines)
 

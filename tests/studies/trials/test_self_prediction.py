@@ -54,6 +54,11 @@ class Meeting(na.Scenario, na.Prediction):
         return -abs(self.moved(joint_actions)[..., 0]).max(axis=-1)
 
 
+class Broken(Meeting):
+    def states(self, agent, joint_actions):
+        return super().states(agent, joint_actions) * np.nan
+
+
 class Ahead(na.Prediction):
     def __init__(self, world):
         self.world = world
@@ -72,10 +77,10 @@ DECIDING = [
 ]
 
 
-def rows(learner: dict, predicts: str) -> list[str]:
+def rows(learner: dict, predicts: str, kind: str = "Meeting") -> list[str]:
     table = {
         "seeds": 1, "episodes": 5, "steps": 15, "evaluation": 3, "learner": learner,
-        "scenario": {"kind": "meeting.py:Meeting", "predicts": predicts},
+        "scenario": {"kind": f"meeting.py:{kind}", "predicts": predicts},
     }  # fmt: skip
     trial = trials_of(Spec.of(table, Sources(Path(), {"meeting.py": MEETING})))[0]
     with trial.sources.active():
@@ -87,3 +92,9 @@ def test_a_prediction_may_be_the_same_object_at_every_decision(learner: dict) ->
     expected = rows(learner, "a new object")
     assert rows(learner, "itself") == expected
     assert rows(learner, "the same object") == expected
+
+
+@pytest.mark.parametrize("evaluator", EVALUATORS)
+def test_a_prediction_that_is_not_finite_is_refused(evaluator: str) -> None:
+    with pytest.raises(ValueError, match=r"Broken: predicted states of agent \d are not finite"):
+        rows({"decision": {"evaluator": evaluator}}, "itself", "Broken")
