@@ -172,8 +172,8 @@ def rows_of(frame: pd.DataFrame) -> Iterator[tuple[object, ...]]:
     yield from frame.astype(object).where(frame.notna(), None).itertuples(index=False, name=None)
 
 
-GREATER, SPACED = r"\\ge", r"\\;["
-"""Parts of estimates in LaTeX."""
+IN_LATEX = {">= ": r"\\ge", r" \[": r"\\;[", r"e(-?\d+)": r"\\times 10^{\1}"}
+"""Parts of estimates as patterns, and in LaTeX."""
 MARKUP = re.compile(r"[\\`*<|$~]|&(?=#?\w+;)|\](?=[(\[])|\b_|_\b")
 """Characters that Markdown does not show as they are."""
 UNKNOWN = exactly(np.nan)
@@ -296,7 +296,7 @@ class SummaryTable:
     @property
     def latex(self) -> str:
         """The whole table in LaTeX."""
-        maths = self.cells.replace({">= ": GREATER, r" \[": SPACED}, regex=True)
+        maths = self.cells.replace(IN_LATEX, regex=True)
         cells = maths.map(lambda text: f"${text}$" if text else "--")
         cells.insert(0, "condition", [line.condition for line in self.lines])
         cells.insert(1, "seeds", [line.seeds for line in self.lines])
@@ -356,16 +356,8 @@ def tabulate(
 def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> str:
     """Return a frame of LaTeX as a table of booktabs, a line after the other.
 
-    Parameters
-    ----------
-    frame
-        Cells by heading.
-    names
-        Column of plain text that needs escaping, as headings do.
-    columns
-        Arguments of ``tabular``: how columns are aligned.
-    note
-        What a comment above the table says besides the package that it needs.
+    The column `names` is plain text that needs escaping, as headings do; `columns` are the
+    arguments of ``tabular``. A comment above the table names the package, followed by `note`.
     """
     clean = frame.assign(**{names: frame[names].map(_in_one_line)}).rename(columns=_in_one_line)
     style = clean.style.hide(axis="index").format_index(_protected, escape="latex", axis=1)

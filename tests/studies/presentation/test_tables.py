@@ -106,6 +106,11 @@ def test_p_values_are_for_other_programs_and_papers():
     assert "0.046" not in table.text(), "the verdicts below have it"
 
 
+def test_powers_of_ten_in_latex():
+    table = tabulate([Summary("a", 8, {"x": estimate(1.8e-5, 1e-5, 2e-5)})])
+    assert r"$1.8\times 10^{-5}\;[1.0\times 10^{-5}, 2.0\times 10^{-5}]$" in table.latex
+
+
 def test_means_at_an_end_of_their_range_are_told_from_student_intervals():
     def legend(values, bounds):
         estimates = {"recovery time": bootstrap(values, bounds=bounds)}
