@@ -112,11 +112,11 @@ def test_a_file_in_the_way_of_the_folder_is_one_line(study, tmp_path, capsys):
 
 
 def test_json_gives_the_table_that_the_study_gives(study, tmp_path, capsys):
-    columns = ["--columns", "evaluation success", "time in contact"]
+    columns = ["--columns", "evaluation success", "training time in contact"]
     assert main(["table", str(study), "--format", "markdown", *columns]) == 0
     of_study = capsys.readouterr().out
     assert of_study.startswith(
-        "| condition | seeds | evaluation success | time in contact |\n| --- |"
+        "| condition | seeds | evaluation success | training time in contact |\n| --- |"
     )
     assert main(["export", str(study), "--out", str(tmp_path), "--format", "json"]) == 0
     path = Path(capsys.readouterr().out.strip())
