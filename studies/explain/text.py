@@ -21,6 +21,8 @@ MAX_LINES = 8
 """Maximum number of roles in the figure of functions."""
 MIN_CHANGE = 0.25
 """Minimum reported change of an actuator, as a share of its nominal drive."""
+MIN_DRIVE = 0.1
+"""Share of its drive up to which an actuator is said not to drive."""
 
 
 def summarize(explained: Explanation) -> list[str]:
@@ -135,14 +137,14 @@ def changes(bodies: Sequence[WheelEffects], actuators: Sequence[str]) -> Iterato
             if abs(drive - 1.0) > MIN_CHANGE:
                 caveat = "" if abs(drive - 1.0) > 2.0 * deviation else "; uncertain"
                 share = f"{drive:+.2f} ± {deviation:.2f} of its drive"
-                yield f"{name}: {share}, {_name_drive(drive)}{caveat}"
+                yield f"{name}: {share}, {_name_drive(drive, deviation)}{caveat}"
 
 
-def _name_drive(drive: float) -> str:
-    if drive < -MIN_CHANGE:
-        return "as if it were reversed"
-    if drive <= MIN_CHANGE:
+def _name_drive(drive: float, deviation: float) -> str:
+    if abs(drive) <= max(MIN_DRIVE, 2.0 * deviation):
         return "as if it did not drive"
+    if drive < 0.0:
+        return "as if it were reversed"
     return "as if it were weak" if drive < 1.0 else "stronger than its geometry"
 
 
