@@ -315,6 +315,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "thousand-arms",
         "tasks",
         "readings",
+        "paper-ladder",
         "told",
         "costs",
         "controls",

@@ -29,6 +29,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
     [
         ("learning-curve", COLUMNS),
         ("tasks", COLUMNS),
+        ("paper-ladder", COLUMNS),
         ("tasks-written", ("training success", *COLUMNS[1:])),
         ("hand-written", ("evaluation success", "all touch")),
         ("told", COLUMNS),
