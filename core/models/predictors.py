@@ -133,12 +133,12 @@ class Mirror:
         """
         partners = partners_of(scenario)
         if partners is None:
-            raise ValueError("mirrored = true: the scenario declares no mirror symmetry")
+            raise ValueError("learner.mirrored: the scenario declares no mirror symmetry")
         variables = scenario.state_space.variables
         for variable in variables:
             if variable.mirrored is None:
                 raise ValueError(
-                    f"mirrored = true: state variable {variable.name!r} does not say whether a "
+                    f"learner.mirrored: state variable {variable.name!r} does not say whether a "
                     "mirror turns its sign; declare mirrored = 'same' or 'opposite'"
                 )
         signs = [-1.0 if variable.mirrored == "opposite" else 1.0 for variable in variables]

@@ -140,7 +140,7 @@ def test_the_learning_curve_and_its_publication(study):
     analysis = learning.analyse(results)
     assert tabulate(analysis.table).titles == (
         "training success", "evaluation success", "evaluation steps",
-        "greatest spread of the carts [m]", "distance [m]",
+        "training greatest spread of the carts [m]", "training distance [m]",
     )  # fmt: skip
     (figure,) = learning.draw(analysis).values()
     shown = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
