@@ -155,7 +155,7 @@ def agreement(
     joint_action
         ``(n,)`` joint action that was then taken.
     left
-        ``(k,)`` agents that have left, whose actions all know.
+        ``(k,)`` agents that have left; the others know their actions.
 
     Examples
     --------

@@ -62,7 +62,7 @@ def metrics_of(
     """Return the columns of the table, given the measures of an episode and their number.
 
     The main measure has columns for the first and last block of training and for the evaluation;
-    measures that are no rates have one for the last block, whose heading says so.
+    other measures, except rates, have one column, for the last block of training.
     """
     title = main.heading
     return (

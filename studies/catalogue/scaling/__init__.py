@@ -38,7 +38,7 @@ def measure(trial: Trial) -> TrialResult:
     team = session.team
     hierarchy = team.hierarchy
     tried = np.array(session.joint_actions)
-    # A team whose values are all zero searches nothing, as in its first episode.
+    # While all values are zero, as in the first episode, best responses try nothing.
     searched = tried > 0 if tried.any() else tried == 0
     seconds = np.array(session.decision_seconds)[searched]
     numbers = {
