@@ -128,7 +128,7 @@ def draw(analysis: Analysis) -> Figures:
         f.handle(", ".join((*rest, f"{count:,} plays")), **look)
         for (rest, count), look in looks.items()
     ]
-    f.add_legend(figure, handles, "bars: 95% intervals", ncols=2)
+    f.add_legend(figure, handles, "bars: 95% intervals", max_columns=2)
     return {"games": figure}
 
 

@@ -146,7 +146,7 @@ def draw(analysis: Analysis) -> Figures:
         f.handle(world or "all", color=f.look(i)["color"], marker="o")
         for i, world in enumerate(worlds)
     ]
-    f.add_legend(figure, handles, ncols=5)
+    f.add_legend(figure, handles, max_columns=5)
     return {"related": figure}
 
 

@@ -87,7 +87,7 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
         if is_measured:
             handles.append(figures.handle("lines: formula", color="gray"))
             handles.append(figures.handle("markers: measured", ls="", marker="o", color="gray"))
-        figures.add_legend(figure, handles, ncols=1 + columns)
+        figures.add_legend(figure, handles, max_columns=1 + columns)
         figures.write(figures.spell_dollars(figure, names), path)
 
 

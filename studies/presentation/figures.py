@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -39,6 +40,14 @@ MARKERS = "osD^vPX"
 """Markers of points, one for each color."""
 MAX_STEM = 100
 """Maximum number of characters of the name of a file, without numbers and the suffix."""
+CHARACTERS = 15
+"""Characters of a legend that fit into an inch."""
+HANDLE = 6
+"""Characters that would fit into the place of a legend's line or marker."""
+LEGEND_ROWS = 4
+"""Lines of a legend for which every figure has room."""
+ROW_HEIGHT = 0.2
+"""Height of a line of a legend [inch]."""
 IN_ROW = 0.2
 """Distance between the points of one row of a chart [rows]."""
 SETTINGS: dict[str, Any] = {
@@ -105,7 +114,7 @@ def look(index: int) -> dict[str, Any]:
 
 def marker(index: int) -> str:
     """Return the marker that belongs to a `look`."""
-    return MARKERS[index % len(MARKERS)]
+    return MARKERS[(index + index // len(COLORS)) % len(MARKERS)]
 
 
 def draw_curve(
@@ -169,18 +178,32 @@ def handle(label: str, **kwargs: Any) -> Line2D:
     return Line2D([], [], label=label, **kwargs)
 
 
-def add_legend(figure: Figure, handles: Sequence[Artist], title: str = "", ncols: int = 4) -> None:
-    """Add a legend above the panels."""
+def add_legend(
+    figure: Figure, handles: Sequence[Artist], title: str = "", max_columns: int = 4
+) -> None:
+    """Add a legend above the panels, with as many columns as fit; long labels are wrapped.
+
+    The figure grows with a legend of more than `LEGEND_ROWS` lines, so that its panels do not
+    shrink.
+    """
+    room = int(CHARACTERS * figure.get_figwidth())
+    for entry in handles:
+        entry.set_label(fill(str(entry.get_label()), room - 3 * HANDLE))
+    lines = [str(entry.get_label()).splitlines() for entry in handles]
+    longest = max(len(line) for label in lines for line in label)
+    columns = max(1, min(max_columns, room // (longest + HANDLE)))
+    rows = sum(map(len, lines)) / columns
+    figure.set_figheight(figure.get_figheight() + max(0.0, rows - LEGEND_ROWS) * ROW_HEIGHT)
     figure.legend(
-        handles=handles, title=title or None, loc="outside upper center", ncols=ncols,
+        handles=handles, title=title or None, loc="outside upper center", ncols=columns,
         frameon=False, handlelength=3,
     )  # fmt: skip
 
 
 def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_of: object) -> None:
-    """Add a legend of curves above the panels, with as many columns as fit."""
+    """Add a legend of curves above the panels."""
     handles = [handle(label, **look(i), lw=1.6, **look_of) for i, label in enumerate(labels)]
-    add_legend(figure, handles, title, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
+    add_legend(figure, handles, title)
 
 
 def save(
@@ -254,8 +277,6 @@ def check_suffix(path: Path) -> None:
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
 
 
-CHARACTERS = 15
-"""Characters of a legend that fit into an inch."""
 APART = 0.06
 """Distance between neighboring lines, in doublings of the horizontal axis."""
 
@@ -292,11 +313,9 @@ def scale_axis(axes: Axes, sizes: Sequence[int]) -> None:
 def name_lines(
     figure: Figure, labels: Sequence[str], title: str, others: Sequence[Line2D] = ()
 ) -> None:
-    """Add a legend of lines, and other entries, above the panels with as many columns as fit."""
+    """Add a legend of lines, and other entries, above the panels."""
     handles = [*(handle(label, **style(i)) for i, label in enumerate(labels)), *others]
-    longest = max(len(str(entry.get_label())) for entry in handles)
-    room = int(CHARACTERS * figure.get_figwidth() // (longest + 6))
-    add_legend(figure, handles, title, ncols=max(1, min(4, room)))
+    add_legend(figure, handles, title)
 
 
 def draw_forest(
@@ -352,7 +371,7 @@ def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
         handle("lower than the reference", color=COLORS[1], linewidth=1.5),
     ]
     seeds = count_seeds(line.seeds for line in lines)
-    add_legend(figure, handles, f"means over {seeds} seeds, bars: 95% intervals", ncols=2)
+    add_legend(figure, handles, f"means over {seeds} seeds, bars: 95% intervals", max_columns=2)
 
 
 def count_seeds(counts: Iterable[int]) -> str:

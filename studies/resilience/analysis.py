@@ -134,9 +134,16 @@ class Resilience:
         return "undecided"
 
     def worst(self, own: TeamLosses) -> Difference | None:
-        """Return the single loss that costs most; None if there are fewer than two seeds."""
-        single = self.single[own.condition]
-        return min(single, key=lambda d: float(d.estimate.value)) if single else None
+        """Return the single loss that costs most; None if there are fewer than two seeds.
+
+        If the verdict is undecided, it is the loss whose interval reaches farthest down.
+        """
+        undecided = self.verdict(own) == "undecided"
+        return min(
+            self.single[own.condition],
+            key=lambda d: float(d.estimate.low if undecided else d.estimate.value),
+            default=None,
+        )
 
     @property
     def loss_measure(self) -> Measure:
@@ -227,8 +234,10 @@ class Resilience:
             yield f"{own.condition}: one seed has no interval, so that nothing can be said."
             return
         place = own.positions[own.units.index(worst.condition)]
+        verdict = self.verdict(own)
+        kind = "least certain" if verdict == "undecided" else "worst"
         yield (
-            f"{own.condition}: {VERDICTS[self.verdict(own)]}. The worst "
+            f"{own.condition}: {VERDICTS[verdict]}. The {kind} "
             f"is that of {worst.condition} ({place}), which changes {self.title} by "
             f"{format_estimate(worst.estimate, signed=True)}."
         )

@@ -194,7 +194,7 @@ def draw(analysis: Analysis) -> Figures:
     handles = [f.handle(label, **f.look(i), lw=1.6, **filled) for i, label in enumerate(labels)]
     if len(labels) < len(courses):
         handles.append(f.handle("sampled actions", color="#444444", lw=0, **hollow))
-    f.add_legend(figure, handles, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
+    f.add_legend(figure, handles)
     return {"experience": figure}
 
 

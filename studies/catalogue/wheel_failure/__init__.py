@@ -343,7 +343,7 @@ def draw(analysis: Analysis) -> Figures:
         entries.append(Patch(label="transient failure", **TRANSIENT))
     seeds = f.count_seeds(len(course.measured.success) for course in courses)
     title = f"what adapts; means over {seeds} seeds and {SMOOTHED} episodes, 95% bands"
-    f.add_legend(figure, entries, title, ncols=3)
+    f.add_legend(figure, entries, title, max_columns=3)
     return {"wheel-failure": figure}
 
 

@@ -116,6 +116,14 @@ def test_one_agent_without_which_the_team_fails_is_enough_for_no():
     )
 
 
+def test_the_loss_that_leaves_the_verdict_undecided_is_named():
+    analysis, own = resilience({(0,): (6, 10) * 6, (1,): (9,) * 12, (2,): (7,) + (10,) * 11})
+    changes = {d.condition: d.estimate for d in analysis.single["chain"]}
+    assert analysis.verdict(own) == "undecided"
+    assert analysis.worst(own).condition == min(changes, key=lambda unit: changes[unit].low)
+    assert "The least certain is that of b (middle)" in " ".join(analysis.sentences)
+
+
 def test_performance_halves_with_the_number_of_losses_at_which_its_mean_is_half():
     single = {(i,): (8, 9) * 6 for i in range(3)}
     pairs = {(0, 1): (4, 6) * 6, (1, 2): (5,) * 12}
