@@ -239,7 +239,7 @@ class SummaryTable:
             *wrapped(self.remark or usual),
         ]
         if any(is_at_end(e) for line in self.lines for e in line.estimates.values()):
-            lines.append("Means at an end of their range have Wilson intervals, scaled to it.")
+            lines.append("Means at a limit of their range have Wilson intervals, scaled to it.")
         if has_lower_bounds(self.lines):
             lines.append("Lower bounds (>=): some values are only known to be larger.")
         is_estimate = (self.cells != "") & ~self.cells.map(lambda text: text.startswith(">="))

@@ -34,7 +34,7 @@ from ..study import check_evaluated
 
 AFTER = "after "
 """Prefix of the phases of evaluations during training; the number of decisions follows."""
-AFTER_LINE = "after N: at the first stop at or after N joint decisions of all environments."
+AFTER_LINE = "after N: evaluated when all environments together have made N joint decisions."
 FIRST = 1000
 """Decisions before the first evaluation."""
 DECISIONS = "decisions"

@@ -46,7 +46,7 @@ REFERENCE = "chain"
 """Reference of comparisons, if it is among the hierarchies."""
 DECIDING = "decision time [ms]"
 """Title of the time of a decision."""
-MESSAGES = "Messages: communicated decisions, without the states broadcast for prediction."
+MESSAGES = "Messages: communicated decisions; the broadcast of states is not counted."
 
 
 def check(spec: Spec) -> None:
