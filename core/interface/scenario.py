@@ -234,17 +234,21 @@ def checked_scenario(thing: object) -> Scenario:
     name = type(thing).__name__
     if not isinstance(thing, Scenario):
         hint = ""
-        if hasattr(thing, "action_space"):
-            kind = "pettingzoo" if hasattr(thing, "possible_agents") else "gymnasium"
+        if not _lacking(thing, "action_space"):
+            kind = "gymnasium" if _lacking(thing, "possible_agents") else "pettingzoo"
             hint = f"; a spec names it by scenario.id, with scenario.kind = {kind!r}"
         raise ValueError(f"scenario.kind: {name} must inherit nested_agents.Scenario{hint}")
-    missing = [key for key in ("agents", "state_space", "action_set") if not hasattr(thing, key)]
-    if missing:
+    if missing := _lacking(thing, "agents", "state_space", "action_set"):
         raise ValueError(f"scenario.kind: {name} lacks {', '.join(missing)}")
     for member, needed in REQUIRED_WITH.items():
-        if hasattr(thing, member) and not hasattr(thing, needed):
+        if _lacking(thing, member, needed) == [needed]:
             raise ValueError(f"scenario.kind: {name} has {member}, and lacks {needed}")
     return thing
+
+
+def _lacking(thing: object, *members: str) -> list[str]:
+    """Return the members that a user's object does not have."""
+    return [member for member in members if not hasattr(thing, member)]
 
 
 def has_same_agents(scenario: Scenario, other: Scenario) -> bool:

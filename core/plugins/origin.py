@@ -1,10 +1,10 @@
 """Origin of classes and functions that a text names: the file or package that defines them."""
 
-import sys
 from collections.abc import Callable
 from inspect import isfunction
 from typing import Any
 
+from .sources import file_of_module
 from .trust import module_named
 
 
@@ -41,8 +41,7 @@ def checked_origin(
     if module:
         is_own = thing.__module__.partition(".")[0] == module.partition(".")[0]
     else:
-        source = getattr(sys.modules.get(thing.__module__), "__source_name__", None)
-        is_own = source == reference.rpartition(":")[0]
+        is_own = file_of_module(thing.__module__) == reference.rpartition(":")[0]
     if not is_own:
         raise ValueError(
             f"is defined in {thing.__module__}; allowed: {kind} that the named file or package "

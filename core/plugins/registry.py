@@ -18,9 +18,10 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from functools import cache
-from inspect import getdoc, signature
+from inspect import getdoc, signature, unwrap
 from pathlib import Path
 from pkgutil import resolve_name
+from types import FunctionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import Field, create_model
@@ -138,15 +139,17 @@ class Registry:
         ValueError
             If it is defined in no file, as in an interactive session.
         """
-        defined = getattr(thing, "function", thing)
-        module = sys.modules.get(getattr(defined, "__module__", ""))
-        name = str(getattr(defined, "__qualname__", ""))
-        if module is None or not name or "<" in name:
+        function: Any = getattr(thing, "function", thing)  # that of a state variable
+        defined = unwrap(function)
+        is_named = isinstance(defined, type | FunctionType) and "<" not in defined.__qualname__
+        module = sys.modules.get(defined.__module__) if is_named else None
+        if module is None:
             raise ValueError(
                 f"{thing!r} is not defined at the top level of a file; define it there"
             )
-        if "__source_name__" in vars(module):
-            return f"{vars(module)['__source_name__']}:{name}"
+        name = defined.__qualname__
+        if file := sources.file_of_module(module.__name__):
+            return f"{file}:{name}"
         place = f"{module.__name__}:{name}"
         for known, where in {**self.built_in, **self.installed()}.items():
             if where == place:

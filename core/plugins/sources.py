@@ -21,7 +21,8 @@ from binascii import Error as BinasciiError
 from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
-from types import ModuleType
+from pkgutil import resolve_name
+from types import FunctionType, ModuleType
 from typing import Any
 
 from ..isolation import same_folder
@@ -158,14 +159,16 @@ class Sources:
         """
         path, name = split(reference)
         module = self._module(path)
-        thing: Any = module
-        for part in name.split("."):
-            thing = getattr(thing, part, None)
-        if thing is None:
-            its = vars(module).items()
-            own = [n for n, f in its if getattr(f, "__module__", "") == module.__name__]
-            raise ValueError(f"{path} has no {name!r}, it has: {', '.join(own) or 'nothing'}")
-        return thing
+        try:
+            return resolve_name(f"{module.__name__}:{name}")
+        except AttributeError:
+            own = [
+                n
+                for n, thing in vars(module).items()
+                if isinstance(thing, type | FunctionType) and thing.__module__ == module.__name__
+            ]
+            known = ", ".join(own) or "nothing"
+            raise ValueError(f"{path} has no {name!r}, it has: {known}") from None
 
     def content(self, name: str) -> bytes:
         """Return the bytes of a saved team.
@@ -260,7 +263,7 @@ class Sources:
         module = ModuleType(key)
         path = None if self.folder is None else self.folder / name
         module.__file__ = str(path.resolve()) if path is not None and path.exists() else name
-        module.__dict__["__source_name__"] = name
+        _FILES[key] = name
         file = compiled_name(module.__file__, text)
         linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
         sys.modules[key] = module  # dataclasses look their own module up
@@ -274,6 +277,13 @@ class Sources:
 
 
 _ACTIVE: ContextVar[Sources | None] = ContextVar("sources", default=None)
+_FILES: dict[str, str] = {}
+"""Names of users' files by those of the modules that were made from them."""
+
+
+def file_of_module(module: str) -> str | None:
+    """Return the name of the user's file from which a module was made; None for other modules."""
+    return _FILES.get(module)
 
 
 def active() -> Sources:
@@ -359,9 +369,11 @@ def format_error(error: BaseException) -> str:
 
 def place(error: BaseException) -> str:
     """Return the last line of a user's file in a traceback, or an empty text."""
-    frames = [(frame.f_globals, line) for frame, line in traceback.walk_tb(error.__traceback__)]
-    places = [(g["__source_name__"], line) for g, line in frames if "__source_name__" in g]
-    return f" in line {places[-1][1]} of {places[-1][0]}" if places else ""
+    place = ""
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        if file := file_of_module(frame.f_globals.get("__name__", "")):
+            place = f" in line {line} of {file}"
+    return place
 
 
 def message(error: BaseException) -> str:

@@ -9,7 +9,7 @@ Whatever an environment returns is checked here, so that inner code can trust it
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from math import isfinite
 from typing import NamedTuple
@@ -79,15 +79,14 @@ class Simulator:
         If a PettingZoo environment does not declare ``possible_agents``.
     """
 
-    def __init__(self, env: Environment, *, is_single: bool = False) -> None:
+    def __init__(self, env: Environment, players: Sequence[Player] | None = (SINGLE,)) -> None:
         self.env = env
-        self.is_single = is_single
-        if is_single:
-            self.players: tuple[Player, ...] = (SINGLE,)
+        self.players = tuple(players or ())
+        self.is_single = self.players == (SINGLE,)
+        if self.is_single:
             self.observation_spaces = {SINGLE: env.observation_space}
             self.action_spaces = {SINGLE: env.action_space}
         else:
-            self.players = tuple(getattr(env, "possible_agents", None) or ())
             self.observation_spaces = {p: env.observation_space(p) for p in self.players}
             self.action_spaces = {p: env.action_space(p) for p in self.players}
         if not self.players:
@@ -213,13 +212,14 @@ def make_simulator(env: object) -> Simulator:
                     f"possible_agents: {name!r} is not text, which PettingZoo requires to make an "
                     "AEC environment parallel"
                 )
-        return Simulator(aec_to_parallel(env))
-    if isinstance(env, ParallelEnv) or hasattr(env, "possible_agents"):
-        return Simulator(env)
+        return Simulator(aec_to_parallel(env), env.possible_agents)
+    players = getattr(env, "possible_agents", None)
+    if isinstance(env, ParallelEnv) or players is not None:
+        return Simulator(env, players)
     if not (hasattr(env, "observation_space") and hasattr(env, "step")):
         name = type(env).__name__
         raise ValueError(f"is {name}, allowed: an environment of Gymnasium or PettingZoo")
-    return Simulator(env, is_single=True)
+    return Simulator(env)
 
 
 def _unpack_reset(returned: object) -> tuple[object, object]:

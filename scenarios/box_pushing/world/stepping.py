@@ -165,7 +165,7 @@ def step_address() -> int | None:
     if config.DISABLE_JIT:
         return None
     try:
-        function = getattr(ctypes.CDLL(_Box2D.__file__), STEP)
+        function = ctypes.CDLL(_Box2D.__file__)[STEP]
     except (OSError, AttributeError):
         return None
     address = ctypes.cast(function, ctypes.c_void_p).value or 0
