@@ -261,7 +261,7 @@ class StudyData:
         criterion: float | None = None,
         budget: str = "",
     ) -> ScalabilityReport:
-        """Answer which hierarchy scales, up to how many agents, and at which cost.
+        """Answer which hierarchy scales, up to how many agents, and at what cost.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Analysis of scalability: which hierarchy, how many agents, at which cost."""
+"""Analysis of scalability: which hierarchy, how many agents, at what cost."""
 
 from __future__ import annotations
 

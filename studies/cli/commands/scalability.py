@@ -1,4 +1,4 @@
-"""The command that answers which hierarchy scales, how far, and at which cost."""
+"""The command that answers which hierarchy scales, how far, and at what cost."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def scalability(
     trust: bool,
     **choices: options.Checked,
 ) -> int:
-    """Show which hierarchy scales, up to how many agents, and at which cost.
+    """Show which hierarchy scales, up to how many agents, and at what cost.
 
     DIR is the folder of a study that sweeps a size and, to compare them, hierarchies. For every
     hierarchy and size the table has performance, speed-up, efficiency, serial fraction and costs.
