@@ -53,7 +53,7 @@ class Measure:
         >>> Measure("final_distance_m", "distance", "m").heading
         'distance [m]'
         """
-        return self.title if self.unit == "1" else f"{self.title} [{self.unit}]"
+        return self.title if (self.unit or "1") == "1" else f"{self.title} [{self.unit}]"
 
 
 SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)

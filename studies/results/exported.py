@@ -15,6 +15,7 @@ from .results_file import Header
 from .score_tables import ScoreTable
 from .scores import (
     KEYS,
+    PHASES,
     ScoreResults,
     refuse_repeated,
     results_of,
@@ -74,7 +75,12 @@ def read_export(
     scores = keys.assign(
         phase=table.names("phase"), episode=_whole(table, "episode"), steps=_whole(table, "steps")
     )
+    is_known = scores["phase"].str.partition(":")[0].isin(PHASES)
+    table.refuse(~is_known, "phase", f": must begin with {' or '.join(PHASES)}")
     values = {n: table.numbers(n) for n in table.columns if n not in (*EPISODES, *swept)}
+    for rate in (m.name for m in header.measures if m.is_rate and m.name in values):
+        is_truth = values[rate].isna() | values[rate].isin((0.0, 1.0))
+        table.refuse(~is_truth, rate, ": must be 0 or 1, or blank")
     scores = scores.assign(**values)
     refuse_repeated(table, scores, {key: key for key in KEYS})
     missing = [m.name for m in header.measures if m.name not in table.columns]

@@ -288,8 +288,8 @@ def detectable_independent(
     """
     first, second = counts
     level = LEVEL / comparisons
-    mirrored = 2 if first == second else 1  # a sample and its complement are equally extreme
-    if mirrored / math.comb(first + second, first) >= level:
+    # `independent_permutation` doubles the smaller tail, of one permutation or more.
+    if 2 / math.comb(first + second, first) >= level:
         return math.inf
     freedom = first + second - 2
     beyond = float(special.stdtrit(freedom, 1.0 - level / 2.0))

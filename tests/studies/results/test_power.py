@@ -223,6 +223,13 @@ def test_what_independent_runs_detect_is_found_as_often_as_promised(
     assert share == pytest.approx(0.8, abs=0.06)
 
 
+@pytest.mark.parametrize("counts", [(2, 5), (2, 6), (3, 4), (3, 3)])
+def test_runs_that_no_permutation_of_labels_can_tell_apart_detect_nothing(counts) -> None:
+    first, second = np.arange(float(counts[0])), 100.0 + np.arange(float(counts[1]))
+    assert independent_permutation(first, second) >= LEVEL  # the clearest difference there is
+    assert detectable_independent(1.0, counts) == np.inf
+
+
 def test_the_power_of_independent_runs_is_printed() -> None:
     rng = np.random.default_rng(1)
     groups = [(rng.normal(size=8), rng.normal(size=9))]
