@@ -14,7 +14,7 @@ import time
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from itertools import chain, islice
 from pathlib import Path
 from platform import python_version
@@ -124,13 +124,13 @@ def versions() -> dict[str, str]:
 
 
 def installed(package: str) -> str:
-    """Return the version of a package. Several packages contain Box2D, so its module is asked."""
+    """Return the version of a package; two packages contain the module Box2D."""
+    from importlib.metadata import PackageNotFoundError, version
+
     if package == "Box2D":
-        import Box2D
-
-        return str(Box2D.__version__)
-    from importlib.metadata import version
-
+        with suppress(PackageNotFoundError):
+            return version("box2d-py")
+        package = "box2d"
     return version(package)
 
 
