@@ -23,6 +23,7 @@ from ..interface.agents import (
     StateDict,
     ValuesStates,
     Vectorized,
+    checked_actions,
 )
 from ..interface.environments import Transitions
 from ..interface.experience import Decision, Experience, Observation
@@ -300,7 +301,8 @@ class Team:
                 continue
             if inboxes is not None:
                 inboxes.append(inbox)
-            by_agent[inbox.agents] = part.act(inputs[stage.part], inbox).T
+            actions = part.act(inputs[stage.part], inbox)
+            by_agent[inbox.agents] = checked_actions(part, actions, len(self.action_set)).T
             self._n_received += len(inbox.senders)
         return joint_action
 

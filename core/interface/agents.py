@@ -18,6 +18,7 @@ import numpy as np
 from ..hierarchy.hierarchy import Hierarchy
 from ..hierarchy.stages import Inbox
 from ..numerics import AnyArray, BoolArray, FloatArray, IntArray
+from ..plugins.words import show
 from .environments import Transitions
 from .experience import Experience, Observation
 from .measures import Measure
@@ -250,3 +251,20 @@ class ValuesStates(Protocol):
         ValueError
             If the states have other variables; one line.
         """
+
+
+def checked_actions(agents: object, actions: object, n_actions: int) -> IntArray:
+    """Return actions that agents chose.
+
+    Raises
+    ------
+    ValueError
+        If one is no index of an action; one line.
+    """
+    chosen = np.asarray(actions)
+    if chosen.dtype.kind not in "iu" or chosen.min() < 0 or chosen.max() >= n_actions:
+        raise ValueError(
+            f"{type(agents).__name__}.act returns {show(actions)}, allowed: whole numbers from 0 "
+            f"to {n_actions - 1}"
+        )
+    return chosen

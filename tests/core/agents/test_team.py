@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from acting import fuzzy, joint_of, look
 
+import nested_agents as na
 from nested_agents.core.agents.joint import join_agents
 from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.team import Team
@@ -533,3 +534,14 @@ def test_a_learner_that_asks_is_given_what_was_done_where() -> None:
     before = success(1000, 20, learn=False)
     success(0, 60, learn=True)
     assert success(1000, 20, learn=False) > before + 0.3
+
+
+@pytest.mark.parametrize("wrong", [[-1], [99], [0.5]])
+def test_an_action_that_agents_do_not_have_is_refused(monkeypatch, wrong: list[float]) -> None:
+    scenario = na.LineUpSettings(carts=2).build()
+    hierarchy = na.build_hierarchy(na.parse_topology("chain"), scenario.agents)
+    team = na.Team(na.BatchTDSettings(), scenario, hierarchy, na.policy_seed(0))
+    observation = team.observe(scenario, scenario.reset(seed=1))
+    monkeypatch.setattr(type(team.parts[0]), "act", lambda *_: np.array(wrong))
+    with pytest.raises(ValueError, match=r"act returns \[.*\], allowed: whole numbers from 0 to"):
+        team.act(observation)
