@@ -20,8 +20,9 @@ from ..plugins.settings import Fraction, Positive
 from ..values.rule_base import RuleBase
 from .learner import Learner, LearnerSettings
 
-TERMINAL, CUT_OFF = -1, -2
-"""Indices of the next after-state: the same state forever, or unknown."""
+TERMINAL, CUT_OFF, ABSENT = -1, -2, -3
+"""Indices of the next after-state: the same state forever, unknown, or unknown because the agent did
+not decide. Rewards of the last kind are not learned from, also not as the range of targets."""
 REWARD_SCALE = 100.0
 """Scale of rewards, which are of the order of 0.01, in the regression."""
 MOST_RULES = 4096
@@ -123,11 +124,11 @@ class BatchTD(Learner):
         """Store an after-state; regress after every `interval` decisions."""
         n = len(states)
         if self._is_running and not self.values_decisions:
-            self._experience["follower"][-1][-n:][self.idle] = CUT_OFF
+            self._experience["follower"][-1][-n:][self.idle] = ABSENT
         self._n_states += n
         follower = np.full(n, TERMINAL) if terminated else self._n_states + np.arange(n)
         if terminated or self.values_decisions:
-            follower[self.idle] = CUT_OFF
+            follower[self.idle] = ABSENT
         step = {
             "rows": self.rows,
             "states": states.copy(),
@@ -151,8 +152,8 @@ class BatchTD(Learner):
         return bool((self._experience["follower"][-1] >= self._n_states).any())
 
     def _cut_off(self) -> None:
-        if self._is_running:
-            self._experience["follower"][-1][-len(self.rows) :] = CUT_OFF
+        last = self._experience["follower"][-1][-len(self.rows) :]
+        last[last >= self._n_states] = CUT_OFF
 
     def _all(self, name: str, first: int = 0) -> AnyArray:
         """Return one array of all after-states, from a step on."""
@@ -167,13 +168,13 @@ class BatchTD(Learner):
         for row, (own, (taken, strengths)) in enumerate(zip(places, self._active, strict=True)):
             follower = follower_of_all[own]
             rewards = REWARD_SCALE * rewards_of_all[own]
-            weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
+            weights, values_of, solve = self._equations(row, (follower >= TERMINAL).astype(float))
             discounts = s.discount ** durations[own]
-            # Sums of rewards that repeat forever: one a decision, or one an option.
-            sums = np.append(rewards / (1.0 - s.discount), rewards / (1.0 - discounts))
+            present = follower != ABSENT
+            limits = range_of_returns(rewards[present], s.discount, discounts[present])
             theta = self.theta[row].astype(float) * REWARD_SCALE
             paid = rewards, follower, discounts, weights
-            constants = s.discount, s.trace_decay, sums.min(), sums.max()
+            constants = s.discount, s.trace_decay, *limits
             for _ in range(s.regression_iterations):
                 theta = solve(aim(values_of(theta), paid, constants, taken, strengths, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
@@ -266,6 +267,14 @@ class BatchTD(Learner):
         self._experience["rows"] = [renamed[self._all("rows")]]
 
 
+def range_of_returns(
+    rewards: FloatArray, discount: float, discounts: FloatArray
+) -> tuple[float, float]:
+    """Return the range of sums of rewards that repeat forever: one a decision, or one an option."""
+    sums = np.append(rewards / (1.0 - discount), rewards / (1.0 - discounts))
+    return (float(sums.min()), float(sums.max())) if sums.size else (0.0, 0.0)
+
+
 @njit(cache=True)
 def add_gram(
     gram: FloatArray, active: IntArray, strengths: FloatArray, weights: FloatArray
@@ -351,7 +360,7 @@ def lambda_returns(
     for s in range(len(values) - 1, -1, -1):
         if follower[s] == TERMINAL:
             returns[s] = rewards[s] / (1.0 - discount)
-        elif follower[s] == CUT_OFF:
+        elif follower[s] < 0:
             returns[s] = values[s]
         else:
             after = follower[s]

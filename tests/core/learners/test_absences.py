@@ -55,7 +55,7 @@ def test_own_weights_stay_while_an_agent_is_absent(name: str, absence: Any) -> N
 
 @pytest.mark.parametrize("name", TABLES)
 def test_shared_weights_do_not_learn_from_absent_agents(name: str) -> None:
-    """The second of three agents is absent in two steps; its state between them differs."""
+    """The second of three agents is absent in two steps; its state and reward between differ."""
     thetas = []
     for offset in (0.0, 0.3):
         team, _ = team_of(name, weights="role")
@@ -69,7 +69,8 @@ def test_shared_weights_do_not_learn_from_absent_agents(name: str) -> None:
         actions[2:4, 1] = round(10 * offset)
         for t in range(8):
             learner.idle = np.array([1] if t in (2, 3) else [], dtype=int)
-            reward = float(rng.normal())
+            reward = np.full(3, rng.normal())
+            reward[1] += 1e4 * offset * (t == 2)  # batch learners clip targets to a range
             learner.observe_decision(states[t], actions[t], states[t + 1], reward, t == 7)
         learner.end_episode()
         thetas.append(learner.theta)
