@@ -56,7 +56,8 @@ def analyse(results: Results) -> Analysis:
             for d in compared:
                 shown = format_estimate(d.estimate)
                 notes.append(f"  {d.condition}: {shown}, p {format_p(d.p)} (adjusted)")
-            notes += power_lines([d.sample for d in compared], title="evaluation success")
+            samples = [d.sample for d in compared]
+            notes += power_lines(samples, len(samples), title="evaluation success")
     return Analysis(tuple(table), tuple(notes), ratios)
 
 

@@ -193,8 +193,8 @@ def verdicts(
     title = title or " or ".join(dict.fromkeys(d.measure for d in compared))
     samples = [d.sample for d in compared if d.paired]
     independent = [d.values for d in compared if not d.paired]
-    lines += power_lines(samples, measure, title)
-    return lines + independent_power_lines(independent, len(compared), title)
+    lines += power_lines(samples, len(compared), measure, title)
+    return lines + independent_power_lines(independent, len(compared), measure, title)
 
 
 def judged(

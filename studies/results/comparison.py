@@ -252,7 +252,7 @@ def power_of_seeds(results: Results, by: str | None) -> tuple[str, ...]:
         for condition in others
     ]
     samples = [own - base for own, base in pairs if len(own) >= MIN_RUNS]
-    return tuple(power_lines(samples, measure, title_of(measure, phase)))
+    return tuple(power_lines(samples, len(samples), measure, title_of(measure, phase)))
 
 
 def _pair(own: pd.DataFrame, base: pd.DataFrame, pairs_episodes: bool) -> tuple[BySeed, BySeed]:

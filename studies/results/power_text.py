@@ -20,6 +20,9 @@ from .power import (
 from .recovery import is_over_episodes
 from .statistics import Array
 
+AT_POWER = f" with power {format_number(WANTED)}"
+"""End of a sentence on a difference that is detected."""
+
 
 def power_text(
     seeds: int,
@@ -77,11 +80,15 @@ def power_text(
         )
     else:
         least = detectable(deviation, seeds, comparisons)
-        what = f"a difference of {format_number(least)}{unit}" if least < most else "no difference"
-        text = f"{detect} {what}{within} with power {format_number(WANTED)}{adjusted}."
+        text = f"{detect} {_difference(least, most, unit)}{within}{AT_POWER}{adjusted}."
         if enough and goal != format_number(least):
             text += f" A difference of {goal} needs about {enough} seeds."
     return wrapped(f"Power: {text}")
+
+
+def _difference(least: float, most: float, unit: str = "") -> str:
+    """Return the difference that is detected, unless the greatest possible one is smaller."""
+    return f"a difference of {format_number(least)}{unit}" if least < most else "no difference"
 
 
 def planned_text(
@@ -111,14 +118,17 @@ def planned_text(
     return [*known, *wrap(text, WIDTH)]
 
 
-def power_lines(samples: Sequence[Array], measure: Measure = SUCCESS, title: str = "") -> list[str]:
+def power_lines(
+    samples: Sequence[Array], comparisons: int, measure: Measure = SUCCESS, title: str = ""
+) -> list[str]:
     """Return lines on which differences comparisons could find, and how many seeds it takes.
 
     Parameters
     ----------
     samples
-        Differences of single seeds ``(n_seeds,)``, by comparison: all that were adjusted together,
-        of one unit.
+        Differences of single seeds ``(n_seeds,)``, by comparison, of one unit.
+    comparisons
+        Number of comparisons over which p is adjusted.
     measure
         By what conditions are compared. Of success rates, `SMALLEST` is of interest.
     title
@@ -129,13 +139,18 @@ def power_lines(samples: Sequence[Array], measure: Measure = SUCCESS, title: str
     of_rates = is_over_episodes(measure)
     deviation = deviation_of(samples, of_rates=of_rates)
     smallest = SMALLEST if of_rates else None
-    least, greatest = measure.bounds
     seeds = min(map(len, samples))
-    return power_text(seeds, len(samples), deviation, smallest, title, most=greatest - least)
+    return power_text(seeds, comparisons, deviation, smallest, title, most=_greatest(measure))
+
+
+def _greatest(measure: Measure) -> float:
+    """Return the greatest possible difference of a measure."""
+    low, high = measure.bounds
+    return high - low
 
 
 def independent_power_lines(
-    groups: Sequence[tuple[Array, Array]], comparisons: int, measure: str = ""
+    groups: Sequence[tuple[Array, Array]], comparisons: int, measure: Measure, title: str = ""
 ) -> list[str]:
     """Return lines on which difference independent runs detect.
 
@@ -146,7 +161,9 @@ def independent_power_lines(
     comparisons
         Number of comparisons over which p is adjusted.
     measure
-        Title of the measure.
+        By what conditions are compared.
+    title
+        Its title in the lines.
     """
     if not groups:
         return []
@@ -154,13 +171,13 @@ def independent_power_lines(
     counts = min(((len(own), len(base)) for own, base in groups), key=sorted)
     counted = f"{counts[0]} and {counts[1]} independent runs"
     adjusted = f" (p adjusted over {comparisons} comparisons)" if comparisons > 1 else ""
-    within = f" in {measure}" if measure else ""
+    within = f" in {title}" if title else ""
     least = detectable_independent(deviation or 1.0, counts, comparisons)
     if math.isinf(least):
         text = f"{counted} cannot give a p below {LEVEL:g}{within}{adjusted}."
     elif deviation is None:
         text = f"unknown{within}, because the runs of each condition are all equal."
     else:
-        text = f"{counted} detect a difference of {format_number(least)}{within} with power "
-        text += f"{format_number(WANTED)}{adjusted}."
+        difference = _difference(least, _greatest(measure))
+        text = f"{counted} detect {difference}{within}{AT_POWER}{adjusted}."
     return wrapped(f"Power: {text}")

@@ -1,10 +1,11 @@
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import special, stats
 
 from nested_agents.core.interface.measures import RETURN, SUCCESS
 from nested_agents.studies.results import permutation_tests
-from nested_agents.studies.results.analysis import verdict_lines
+from nested_agents.studies.results.analysis import judged, verdict_lines
 from nested_agents.studies.results.differences import Difference, adjust
 from nested_agents.studies.results.permutation_tests import (
     LEVEL,
@@ -128,7 +129,7 @@ def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
     assert [round(d.raw, 4) for d in found] == [0.0625, 0.0625]
     text = " ".join(" ".join(verdict_lines(found)).split())
     assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
-    said = " ".join(line.strip() for line in power_lines([d.sample for d in found]))
+    said = " ".join(line.strip() for line in power_lines([d.sample for d in found], 2))
     assert "5 seeds cannot give a p below 0.05 (p adjusted over 2 comparisons)" in said
     assert "At least 7 seeds are needed; a difference of 0.20 needs about" in said
 
@@ -137,13 +138,13 @@ def test_without_deviation_nothing_is_promised() -> None:
     assert "Power: unknown, because all seeds have the same difference" in " ".join(
         power_text(8, 1, None, None)
     )
-    assert power_lines([]) == []
+    assert power_lines([], 0) == []
 
 
 def test_no_difference_of_rates_beyond_one_is_promised() -> None:
     samples = [np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])]
-    assert "detect no difference with power" in power_lines(samples)[0]
-    assert "detect a difference of" in power_lines(samples, RETURN)[0]
+    assert "detect no difference with power" in power_lines(samples, 1)[0]
+    assert "detect a difference of" in power_lines(samples, 1, RETURN)[0]
 
 
 def test_a_difference_of_rounding_errors_is_none() -> None:
@@ -199,7 +200,7 @@ def test_power_far_out_where_scipy_has_no_number_is_that_of_simulated_studies() 
 
 def test_differences_that_are_equal_except_for_rounding_have_no_power() -> None:
     base = np.linspace(-3.0, 4.0, 8)
-    lines = power_lines([(base + 0.5) - base], RETURN, "score")
+    lines = power_lines([(base + 0.5) - base], 1, RETURN, "score")
     assert " ".join(lines).startswith("Power: unknown in score, because all seeds have the same")
 
 
@@ -233,9 +234,25 @@ def test_runs_that_no_permutation_of_labels_can_tell_apart_detect_nothing(counts
 def test_the_power_of_independent_runs_is_printed() -> None:
     rng = np.random.default_rng(1)
     groups = [(rng.normal(size=8), rng.normal(size=9))]
-    text = " ".join(independent_power_lines(groups, 1, "score"))
+    text = " ".join(independent_power_lines(groups, 1, RETURN, "score"))
     assert text.startswith("Power: 8 and 9 independent runs detect a difference of")
-    few = " ".join(independent_power_lines([(np.arange(3.0), np.arange(3.0))], 1))
+    few = " ".join(independent_power_lines([(np.arange(3.0), np.arange(3.0))], 1, RETURN))
     assert few == "Power: 3 and 3 independent runs cannot give a p below 0.05."
-    equal = " ".join(independent_power_lines([(np.ones(8), np.zeros(8))], 1))
+    equal = " ".join(independent_power_lines([(np.ones(8), np.zeros(8))], 1, RETURN))
     assert "unknown, because the runs of each condition are all equal" in equal
+
+
+def test_no_difference_beyond_the_range_is_promised_to_independent_runs() -> None:
+    pairs = [(np.array([0.0, 1.0, 0.0, 1.0]), np.array([1.0, 0.0, 1.0, 0.0, 1.0]))]
+    assert "detect no difference" in independent_power_lines(pairs, 1, SUCCESS)[0]
+    assert "detect a difference of" in independent_power_lines(pairs, 1, RETURN)[0]
+
+
+def test_power_adjusts_over_paired_and_independent_comparisons_together() -> None:
+    rng = np.random.default_rng(5)
+    scores = {name: pd.Series(rng.normal(size=8), list("abcdefgh")) for name in ("x", "y", "z")}
+    scores["z"].index = list("ABCDEFGH")
+    pairs = [(name, "score", scores[name], scores["x"]) for name in ("y", "z")]
+    _, lines = judged({"score": pairs}, "x", RETURN)
+    text = " ".join(" ".join(lines).split())
+    assert text.count("(p adjusted over 2 comparisons)") == 2
