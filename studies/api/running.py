@@ -21,6 +21,7 @@ from ..errors import SpecError
 from ..presentation.progress import Terminal, count
 from ..spec.spec import Spec
 from ..store.database import CHECKPOINTS
+from ..store.durable import remove_incomplete
 from ..store.store import Store
 from ..trials.arrangement import check_conditions
 from ..trials.checkpoints import remove_damaged
@@ -62,6 +63,7 @@ def _checkpoints(store: Store, seconds: float, observer: Observer) -> Iterator[C
     try:
         yield folder, seconds, code
     finally:
+        remove_incomplete(folder)  # of killed workers
         with suppress(OSError):
             folder.rmdir()
 

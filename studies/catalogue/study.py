@@ -186,7 +186,8 @@ def select_published(name: str, results: Results) -> Results:
     if published is not None:
         measures = tuple(m for m in measures if m.name in published)
     trials = results.trials if study.TIMED else results.trials.drop(columns=list(results.usage))
-    return replace(results, measures=measures, trials=trials)
+    same = results.identical
+    return replace(results, measures=measures, trials=trials, same_conditions=same)
 
 
 def distinct(values: Iterable[T]) -> list[T]:

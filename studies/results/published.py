@@ -8,6 +8,8 @@ committed files give the table that the run gave.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,6 +49,7 @@ def dumps(outline: StudyOutline, results: Results) -> str:
         },
         "numbers": _pack_numbers(results, lambda name: name not in results.usage),
         "usage": _pack_numbers(results, lambda name: name in results.usage),
+        "identical": results.identical,
     }
     return in_lines(content)
 
@@ -114,7 +117,7 @@ def loads(text: str) -> Published:
         If it is something else; one line names the key, its value and what is allowed.
     """
     file = ResultsFile.of(text)
-    for condition in file.seeds:
+    for condition in (*file.seeds, *chain(*file.identical or ())):
         if condition not in file.columns:
             raise ValueError(f"columns.{condition}: is missing")
     rates = [measure.name for measure in file.measures if measure.is_rate]
@@ -131,7 +134,10 @@ def loads(text: str) -> Published:
         for condition, named in _arrays(file.usage, "usage", file.seeds).items()
     }
     results = from_arrays(phases, file.seeds, numbers, usage, file.columns, file.measures)
-    return Published(file.outline, file.limited(results), file.notes)
+    results = file.limited(results)
+    if file.identical is not None:
+        results = replace(results, same_conditions=tuple(map(tuple, file.identical)))
+    return Published(file.outline, results, file.notes)
 
 
 def _arrays(

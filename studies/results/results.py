@@ -78,6 +78,8 @@ class Results:
     pairs_episodes: bool = False
     """Whether conditions are compared on the episodes that both have, such as questions."""
     step_limits: StepLimits = (None, None)
+    same_conditions: tuple[tuple[str, ...], ...] | None = None
+    """Groups of identical conditions where only a part of what was measured is kept."""
 
     def steps(self, phase: str) -> Measure:
         """Return the measure of the length of episodes, which ends at the longest allowed."""
@@ -195,8 +197,11 @@ class Results:
     def identical(self) -> tuple[tuple[str, ...], ...]:
         """Groups of conditions of equal seeds, episodes and measures, to the last digit.
 
-        None of results without returns: published ones keep a part of what is measured.
+        None of results without returns, unless they are published, with the groups.
         """
+        if self.same_conditions is not None:
+            present = [[c for c in same if self.has(c)] for same in self.same_conditions]
+            return tuple(tuple(same) for same in present if len(same) > 1)
         names = ["seed", "phase", "episode", *self._measured]
         groups = dict[bytes, list[str]]()
         for condition, rows in self.episodes.groupby("condition", sort=False)[names]:

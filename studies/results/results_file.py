@@ -239,6 +239,8 @@ class ResultsFile(Header):
     phases: dict[str, dict[str, dict[str, Packed]]]
     numbers: dict[str, dict[str, Packed]]
     usage: dict[str, dict[str, Packed]]
+    identical: list[list[str]] | None = None
+    """Groups of conditions that are identical in every episode, by every measure."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

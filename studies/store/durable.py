@@ -115,6 +115,13 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
             os.close(folder)
 
 
+def remove_incomplete(folder: Path) -> None:
+    """Delete what killed processes have not finished writing to a folder that others do not use."""
+    with suppress(OSError):
+        for incomplete in folder.glob(".*.new"):
+            incomplete.unlink()
+
+
 def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str | None:
     """Write recordings by name to an ``.npz`` file and return the SHA-256 of its content.
 

@@ -40,6 +40,7 @@ def lock_directory(directory: Path) -> Iterator[None]:
         raise SpecError(f"{error.filename}: {error.strerror or error}") from None
     with lock:
         _take(lock, directory)
+        durable.remove_incomplete(directory / "recordings")
         yield
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...core.learners import LEARNERS
-from ..store.durable import Recording, read_bytes, write
+from ..store.durable import Recording, read_bytes, remove_incomplete, write
 from .trial import Trial
 
 TABLE = "table"
@@ -93,8 +93,7 @@ class Checkpoint:
 
 def remove_damaged(folder: Path) -> Iterator[str]:
     """Delete incomplete and damaged checkpoints, and yield a remark on each damaged one."""
-    for incomplete in folder.glob(".*.new"):
-        incomplete.unlink()
+    remove_incomplete(folder)
     for file in sorted(folder.glob("*.npz")):
         if _content(file) is None:
             file.unlink()

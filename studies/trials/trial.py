@@ -150,7 +150,7 @@ class TrialResult:
     """Measurements and recordings of a trial."""
 
     rows: tuple[EpisodeRow, ...]
-    """Episodes in order, training first. They are a function of the trial, bit for bit."""
+    """Episodes in the order in which they ran. They are a function of the trial, bit for bit."""
     measures: tuple[Measure, ...]
     """Measures of any episode. Scenarios of evaluations may lack some of them."""
     recordings: dict[str, Recording]

@@ -88,14 +88,18 @@ SMOOTHED = 3
 
 
 def measure(trial: Trial) -> TrialResult:
-    """Train a team through a failure, and run a copy with fixed weights from its onset on."""
+    """Train a team through a failure, and run a copy with fixed weights from its onset on.
+
+    The copy runs first, because a checkpoint holds one team.
+    """
     onset = trial.settings.onset
     assert onset is not None, "see check"
-    session = Session(trial)
-    session.train(onset)
-    kept = _keeping_weights(session)
-    session.train(trial.episodes - onset, onset)
-    session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
+    session = Session.resumed(trial)
+    session.train(max(onset - session.trained, 0), session.trained)
+    if KEPT not in session.phases:
+        kept = _keeping_weights(session)
+        session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
+    session.train(trial.episodes - session.trained, session.trained)
     return session.finish(_numbers_of(set(trial.settings.failure_spans)))
 
 

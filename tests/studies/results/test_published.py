@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -191,6 +192,22 @@ def test_what_is_sound_is_read(tmp_path, capsys) -> None:
         61,
         9001,
     )
+
+
+def test_identical_conditions_are_named_by_published_results(tmp_path, capsys) -> None:
+    file = tmp_path / "results.json"
+    said = "Identical in every episode, by every measure:\n  default = random\n"
+    for identical in ([["default", "random"]], []):
+        file.write_text(json.dumps(SOUND | {"identical": identical}))
+        for command in ("table", "compare"):
+            assert main([command, str(file)]) == 0
+            assert (said in capsys.readouterr().out) is bool(identical)
+    kept, results, _ = published.load(file)
+    again = published.loads(published.dumps(kept, replace(results, same_conditions=None)))
+    assert again.results.identical == ()  # because there are no returns
+    file.write_text(json.dumps(SOUND | {"identical": [["default", "chain"]]}))
+    assert main(["table", str(file)]) == 2
+    assert "columns.chain: is missing" in capsys.readouterr().err
 
 
 def test_a_key_that_stands_twice_is_named(tmp_path, capsys) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 import nested_agents as na
 from nested_agents import SpecError
+from nested_agents.studies.api import running
 from nested_agents.studies.api.status import Status
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.spec.spec import Spec
@@ -30,6 +31,11 @@ TABLES = {
     "scaling": {**ONE, "study": "scaling"},
     "a wheel fails": {
         **ONE, "scenario": {"failures": [{"kind": "noisy", "wheels": "robot1.left", "episode": 2}]},
+        "learner": {"self_model": {}},
+    },
+    "a copy keeps its weights": {
+        **ONE, "study": "wheel-failure", "episodes": 10,
+        "scenario": {"failures": [{"kind": "noisy", "wheels": "robot1.left", "episode": 5}]},
         "learner": {"self_model": {}},
     },
     "curriculum": {
@@ -131,11 +137,21 @@ def test_damage_is_remarked_once_and_the_trial_begins_anew(tmp_path):
     folder = tmp_path / CHECKPOINTS
     folder.mkdir()
     (folder / f"{trial.identity}.npz").write_bytes(b"0" * 100)
-    (folder / ".half.npz.new").write_bytes(b"")
+    (tmp_path / "recordings").mkdir()
+    for half in (folder / ".half.npz.new", tmp_path / "recordings" / ".half.npz.1.new"):
+        half.write_bytes(b"")
     na.run(TABLES["ours"], tmp_path, jobs=1, observer=observer)
     assert [note for note in observer.notes if "damaged" in note] == [
         f"{folder / trial.identity}.npz: is damaged, its trial starts from the beginning"
     ]
+    assert not folder.exists()
+    assert not list((tmp_path / "recordings").glob(".*"))
+
+
+def test_what_a_killed_worker_has_not_finished_is_removed_at_the_end(tmp_path, monkeypatch):
+    folder = tmp_path / CHECKPOINTS
+    monkeypatch.setattr(running, "pending", lambda *_: (folder / ".half.new").write_text("") or [])
+    na.run(TABLES["ours"], tmp_path, jobs=1, progress=False)
     assert not folder.exists()
 
 
@@ -167,16 +183,16 @@ def test_a_run_that_is_killed_in_the_middle_of_a_trial(tmp_path):
     (tmp_path / "study.toml").write_text(dumps(Spec.of(table).table()))
     out = tmp_path / "out"
     command = ["run", "study.toml", "--out", "out", "--jobs", "1", "--checkpoint", "0.3"]
-    running = subprocess.Popen(
+    process = subprocess.Popen(
         [sys.executable, "-m", "nested_agents", *command],
         cwd=tmp_path, start_new_session=True, stdout=subprocess.DEVNULL,
     )  # fmt: skip
     until = time.monotonic() + 120.0
     while not list((out / "checkpoints").glob("*.npz")) and time.monotonic() < until:
-        assert running.poll() is None
+        assert process.poll() is None
         time.sleep(0.02)
-    os.killpg(running.pid, signal.SIGKILL)
-    running.wait()
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
     now = Status.of(out)
     assert (now.done, now.left) == (0, 1)
     again = na.run(tmp_path / "study.toml", out, jobs=1, progress=False)
