@@ -1,4 +1,5 @@
-import Box2D
+from importlib import metadata
+
 import pytest
 
 from nested_agents.studies.report import page as words
@@ -34,5 +35,10 @@ def test_versions_name_no_host():
 
 
 def test_box2d_may_come_from_any_package(monkeypatch):
-    monkeypatch.setattr(Box2D, "__version__", "2.3.10")
+    def version(package):
+        if package == "box2d-py":
+            raise metadata.PackageNotFoundError
+        return "2.3.10" if package == "box2d" else "1.0"
+
+    monkeypatch.setattr(metadata, "version", version)
     assert dict(words.versions())["Box2D"] == "2.3.10"
