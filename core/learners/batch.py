@@ -22,7 +22,7 @@ from .learner import Learner, LearnerSettings
 
 TERMINAL, CUT_OFF, ABSENT = -1, -2, -3
 """Indices of the next after-state: the same state forever, unknown, or unknown because the agent
-did not decide. Rewards of the last kind are not learned from, also not as the range of targets."""
+did not decide. Rewards of the last kind neither are learned from nor widen the range of targets."""
 REWARD_SCALE = 100.0
 """Scale of rewards, which are of the order of 0.01, in the regression."""
 MOST_RULES = 4096

@@ -130,7 +130,7 @@ def power_lines(
     comparisons
         Number of comparisons over which p is adjusted.
     measure
-        By what conditions are compared. Of success rates, `SMALLEST` is of interest.
+        Measure that is compared. For success rates, `SMALLEST` is of interest.
     title
         Its title in the lines.
     """
@@ -161,9 +161,9 @@ def independent_power_lines(
     comparisons
         Number of comparisons over which p is adjusted.
     measure
-        By what conditions are compared.
+        Measure that is compared.
     title
-        Its title in the lines.
+        Title of the measure in the lines.
     """
     if not groups:
         return []

@@ -31,14 +31,10 @@ CPU = "cpu."
 """Prefix of CPU seconds of training; the number of episodes or decisions until then follows."""
 DONE = "done"
 """State of a trial that has finished."""
-
-
 KEPT = "weights kept"
 """Phase of a copied team that keeps the weights it had when the failure began."""
 STEPS = Measure("steps", "steps", least=0.0)
 """Length of an episode [decisions]. Neither is better: failed episodes may end early or late."""
-
-
 StepLimits = tuple[int | None, int | None]
 """Longest episode of training and of evaluation [steps]; None where it is not known."""
 
@@ -51,9 +47,6 @@ def step_limits(spec: SpecTable) -> StepLimits:
     """
     steps = spec.get("steps")
     return steps, spec.get("evaluation_steps") or steps
-
-
-EVERY_EPISODE = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +116,7 @@ class Results:
         condition: str,
         measure: str,
         phase: str = "training",
-        part: slice = EVERY_EPISODE,
+        part: slice = slice(None),
     ) -> Array:
         """Return a measure of the episodes of a condition ``(n_seeds, n_episodes)``.
 
